@@ -129,6 +129,22 @@ void add_actions(const Foresight& foresight, const Prior& prior, Columns& column
       add_goal("transport of " + transport->object, transport->X_WO);
     if (std::holds_alternative<belief::Push>(actions[a].what))
       columns.add("push: sideways", [&](std::size_t i) { return of(i).sideways; });
+    if (const auto* bump = std::get_if<belief::Bump>(&actions[a].what))
+      columns.add_vector("bump of " + bump->object + ": impulse", [&](std::size_t i) { return of(i).impulse; });
+    if (const auto* grasp = std::get_if<belief::Grasp>(&actions[a].what); grasp != nullptr && grasp->grip) {
+      columns.add("grasp of " + grasp->object + ": grip force", [&](std::size_t i) { return of(i).force; });
+      if (grasp->grip->friction)
+        columns.add("grasp of " + grasp->object + ": finger friction", [&](std::size_t i) { return *of(i).friction; });
+    }
+    const auto add_force = [&](const std::string& name) {
+      columns.add(name + ": force", [&](std::size_t i) { return of(i).force; });
+    };
+    if (const auto* pull = std::get_if<belief::Pull>(&actions[a].what)) add_force("pull of " + pull->object);
+    if (const auto* move = std::get_if<belief::MoveJoint>(&actions[a].what)) add_force("move of " + move->joint);
+    if (const auto* insert = std::get_if<belief::Insert>(&actions[a].what)) {
+      add_force("insert of " + insert->object);
+      columns.add("insert of " + insert->object + ": torque", [&](std::size_t i) { return of(i).torque; });
+    }
   }
 }
 

@@ -103,8 +103,13 @@ void EventPaths::take_actions() {
       known.time += place->duration;
       known.what = belief::Release{place->object, Vector3d::Zero(), 0.2, {}};
     }
+    if (const auto* insert = std::get_if<belief::Insert>(&known.what); insert != nullptr && in_hand) {
+      known.time += insert->duration;
+      known.what = belief::Release{insert->object, Vector3d::Zero(), 0.2, {}};
+    }
     if (in_hand &&
-        (std::holds_alternative<belief::Transport>(known.what) || std::holds_alternative<belief::Pour>(known.what)))
+        (std::holds_alternative<belief::Transport>(known.what) || std::holds_alternative<belief::Pour>(known.what) ||
+         std::holds_alternative<belief::Tilt>(known.what)))
       continue;
     if (std::holds_alternative<belief::Grasp>(known.what))
       remarks_.push_back(object +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Actions that take place while the scene moves: a push along a line, and the opening of a hand on its way.
+// Actions that take place while the scene moves: a push along a line, a blow, and the opening of a hand on its way.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -85,6 +85,46 @@ class PushPlan final : public PlannedAction {
   geometry::TriangleMesh mesh_;
 };
 
+class BumpPlan final : public PlannedAction {
+ public:
+  BumpPlan(const Prior& prior, const belief::AchieveQuery& query, std::size_t index) : PlannedAction(prior, query) {
+    scene_ = prior.scene;
+    name_ = prior.scene->objects[index].name;
+    X_WO_ = prior.likeliest.objects[index].X_WO;
+    lowest_ =
+        heights_of(belief::collision_mesh(prior.scene->model_of(prior.scene->objects[index])), X_WO_.rotation).first;
+  }
+
+  int noise_dimensions() const override { return belief::dimensions(query_.errors.delay); }
+
+  std::vector<belief::Action> begin(std::span<const double> values, std::span<const double> noise,
+                                    belief::WorldState&) const override {
+    std::vector<belief::Action> actions = scene_->actions;
+    actions.push_back(exact(values));
+    actions.back().time += belief::draw(query_.errors.delay, noise);
+    return actions;
+  }
+  /// What gives the blow is not simulated.
+  std::optional<std::string> obstacle(std::span<const double>) override { return std::nullopt; }
+
+  belief::Action exact(std::span<const double> values) const override {
+    const double angle = geometry::kDegree * value("direction_deg", values);
+    const Vector3d along(std::cos(angle), std::sin(angle), 0.0), left(-along.y(), along.x(), 0.0);
+    Vector3d point = X_WO_.translation + value("offset", values) * left;
+    point.z() += lowest_ + value("height", values);
+    belief::Bump bump;
+    bump.object = name_;
+    bump.impulse = belief::Vector3Distribution::fixed(value("impulse", values) * along);
+    bump.point_O = X_WO_.inverse() * point;
+    return {value("time", values), bump};
+  }
+
+ private:
+  std::string name_;
+  Pose X_WO_;
+  double lowest_ = 0.0;
+};
+
 class ReleasePlan final : public PlannedAction {
  public:
   ReleasePlan(const Prior& prior, const belief::AchieveQuery& query, std::size_t index) : PlannedAction(prior, query) {
@@ -121,6 +161,28 @@ class ReleasePlan final : public PlannedAction {
 };
 
 }  // namespace
+
+core::Result<std::unique_ptr<PlannedAction>> plan_bump(const Prior& prior, const belief::AchieveQuery& query,
+                                                       std::size_t index, std::vector<SceneValue>& scene_values) {
+  const belief::SceneObject& object = prior.scene->objects[index];
+  if (object.held_by)
+    return core::invalid_input("'" + object.name + "' is held by " + *object.held_by +
+                               ", which takes every blow: name an object that is free");
+  if (const auto key = moving_errors_reason(query.errors))
+    return core::invalid_input(*key + ": that is of a place; give errors.delay to a bump");
+  if (query.errors.disturbance)
+    return core::invalid_input("errors.velocity: that is of an opening hand; give errors.delay to a bump");
+  if (belief::dimensions(query.errors.lateral_error) > 0 || belief::mean(query.errors.lateral_error) != 0.0)
+    return core::invalid_input("errors.lateral_error: that is of a push; give errors.delay to a bump");
+  const belief::ObjectModel& model = prior.scene->model_of(object);
+  const auto [low, high] = heights_of(belief::collision_mesh(model), prior.likeliest.objects[index].X_WO.rotation);
+  const double mass = belief::mean(model.mass);
+  // Enough for 0.5 m/s; from 0.05 to 2 m/s.
+  scene_values.push_back({"impulse", 0.5 * mass, 0.05 * mass, 2.0 * mass});
+  scene_values.push_back({"height", 0.5 * (high - low), 0.0, high - low});
+  scene_values.push_back({"time", 0.0, 0.0, 1.0});
+  return std::unique_ptr<PlannedAction>(std::make_unique<BumpPlan>(prior, query, index));
+}
 
 core::Result<std::unique_ptr<PlannedAction>> plan_push(const Prior& prior, const belief::AchieveQuery& query,
                                                        std::size_t index, core::ThreadPool& pool,

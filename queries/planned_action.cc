@@ -105,6 +105,7 @@ core::Result<std::unique_ptr<PlannedAction>> plan_action(const Prior& prior, con
   core::Result<std::unique_ptr<PlannedAction>> plan =
       schema->name == "place"  ? plan_place(prior, query, wanted, index, pool, scene_values)
       : schema->name == "push" ? plan_push(prior, query, index, pool, scene_values)
+      : schema->name == "bump" ? plan_bump(prior, query, index, scene_values)
                                : plan_release(prior, query, index, scene_values);
   if (!plan) return plan;
   PlannedAction& made = **plan;

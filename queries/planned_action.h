@@ -87,6 +87,8 @@ core::Result<std::unique_ptr<PlannedAction>> plan_place(const Prior& prior, cons
 core::Result<std::unique_ptr<PlannedAction>> plan_push(const Prior& prior, const belief::AchieveQuery& query,
                                                        std::size_t index, core::ThreadPool& pool,
                                                        std::vector<SceneValue>& scene_values);
+core::Result<std::unique_ptr<PlannedAction>> plan_bump(const Prior& prior, const belief::AchieveQuery& query,
+                                                       std::size_t index, std::vector<SceneValue>& scene_values);
 core::Result<std::unique_ptr<PlannedAction>> plan_release(const Prior& prior, const belief::AchieveQuery& query,
                                                           std::size_t index, std::vector<SceneValue>& scene_values);
 

@@ -142,6 +142,17 @@ void remark_on_tolerance(const belief::Basis& basis, const belief::Effort& effor
                       ".");
 }
 
+/// Held by no grip that may slip, when the action comes.
+bool is_held_fast(const belief::Scene& scene, const belief::Action& when, bool held) {
+  bool fast = held;
+  for (const belief::Action& action : scene.actions) {
+    if (&action == &when) break;
+    const auto* grasp = std::get_if<belief::Grasp>(&action.what);
+    if (grasp != nullptr && grasp->object == belief::object_of(when)) fast = !grasp->grip;
+  }
+  return held && fast;
+}
+
 }  // namespace
 
 void remark_on_actions(const belief::Scene& scene, double duration, std::vector<std::string>& remarks) {
@@ -157,17 +168,18 @@ void remark_on_actions(const belief::Scene& scene, double duration, std::vector<
                         " s that are simulated end before. Ask for a longer duration, or for an earlier action.");
       continue;
     }
-    const bool grasps = std::holds_alternative<belief::Grasp>(action.what);
-    const bool lets_go =
-        std::holds_alternative<belief::Release>(action.what) || std::holds_alternative<belief::Place>(action.what);
-    if (!object.empty() && !grasps && !held.contains(object))
+    if (belief::is_of_held(action) && !held.contains(object))
       remarks.push_back("Nothing holds '" + object + "' when the action " + which +
                         (std::holds_alternative<belief::Release>(action.what)
                              ? " comes: it changes nothing."
                              : " begins: it is moved as if something that is not seen held it."));
-    if (lets_go)
+    if (std::holds_alternative<belief::Bump>(action.what) && is_held_fast(scene, action, held.contains(object)))
+      remarks.push_back(
+          "A hand holds '" + object + "' when the action " + which +
+          " comes: it takes the blow, which changes nothing. Grasp it with a grip_force, which may lose it.");
+    if (belief::lets_go(action))
       held.erase(object);
-    else if (!object.empty())
+    else if (belief::is_of_held(action) || std::holds_alternative<belief::Grasp>(action.what))
       held.insert(object);
   }
 }

@@ -37,6 +37,10 @@ void scale(double factor, belief::Vector3Distribution& distribution) {
   for (ScalarDistribution* d : {&distribution.x, &distribution.y, &distribution.z}) scale(factor, *d);
 }
 
+void scale(double factor, std::optional<Vector3d>& point) {
+  if (point) *point *= factor;
+}
+
 void scale(double factor, Pose& pose) { pose.translation *= factor; }
 
 void scale(double factor, belief::PoseDistribution& distribution) {
@@ -190,6 +194,22 @@ belief::Action scaled(const belief::Action& action, const Similarity& similarity
           what.to *= similarity.length;
           what.radius *= similarity.length;
           scale(similarity.length, what.lateral_error);
+        } else if constexpr (std::is_same_v<T, belief::Grasp>) {
+          if (what.grip) what.grip->pad_length *= similarity.length;
+        } else if constexpr (std::is_same_v<T, belief::Bump>) {
+          scale(similarity.time(), what.impulse);
+          scale(similarity.length, what.point_O);
+        } else if constexpr (std::is_same_v<T, belief::Tilt>) {
+          what.pivot_O *= similarity.length;
+        } else if constexpr (std::is_same_v<T, belief::Pull>) {
+          what.by *= similarity.length;
+          scale(similarity.length, what.point_O);
+        } else if constexpr (std::is_same_v<T, belief::MoveJoint>) {
+          if (what.type == belief::JointType::kSlider) what.to *= similarity.length;
+          scale(similarity.length, what.handle_C);
+        } else if constexpr (std::is_same_v<T, belief::Insert>) {
+          what.distance *= similarity.length;
+          scale(similarity.length, what.torque);
         }
       },
       result.what);

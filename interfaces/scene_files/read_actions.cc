@@ -11,6 +11,11 @@ namespace {
 
 using geometry::Vector3d;
 
+constexpr NumberRange kForce{0.0, 1e6, "give a force in N, at least 0 and at most 1e6"};
+constexpr NumberRange kTorque{0.0, 1e6, "give a torque in N m, at least 0 and at most 1e6"};
+constexpr NumberRange kImpulse{-1e6, 1e6, "give an impulse in N s, between -1e6 and 1e6"};
+constexpr NumberRange kTurnedBy{-360.0, 360.0, "give degrees between -360 and 360", "deg"};
+
 class ActionReader {
  public:
   explicit ActionReader(SceneContext& context) : context_(context), problems_(context.problems) {
@@ -27,8 +32,10 @@ class ActionReader {
       problems_.add(value.place, value.path, "its time is before that of the action above", "sort the actions by time");
     last_time_ = action.time;
     std::string which;
-    const LocatedValue* what = binder.one_of({"release", "place", "push", "pour", "grasp", "transport"},
-                                             "give one of release, place, push, pour, grasp, transport", false, &which);
+    const LocatedValue* what = binder.one_of(
+        {"release", "place", "push", "pour", "grasp", "transport", "bump", "tilt", "pull", "move_joint", "insert"},
+        "give one of release, place, push, pour, grasp, transport, bump, tilt, pull, move_joint, insert", false,
+        &which);
     if (!what) return action;
     Binder fields(*what, problems_);
     if (which == "release") action.what = read_release(fields);
@@ -37,17 +44,40 @@ class ActionReader {
     if (which == "pour") action.what = read_pour(fields);
     if (which == "grasp") action.what = read_grasp(fields);
     if (which == "transport") action.what = read_transport(fields);
+    if (which == "bump") action.what = read_bump(fields);
+    if (which == "tilt") action.what = read_tilt(fields);
+    if (which == "pull") action.what = read_pull(fields);
+    if (which == "move_joint") action.what = read_move_joint(fields);
+    if (which == "insert") action.what = read_insert(fields);
     return action;
   }
 
  private:
+  std::string any_object(Binder& fields) {
+    const LocatedValue* at = fields.require("object", "name one of the scene's objects");
+    return at ? context_.read_name(*at, context_.objects, "an object") : std::string();
+  }
+
   std::string object_name(Binder& fields, std::string_view key) {
     const LocatedValue* at = fields.require(key, "name one of the scene's objects");
     std::string name = at ? context_.read_name(*at, context_.objects, "an object") : std::string();
     if (!name.empty() && belief::joint_of(context_.scene, name))
       problems_.add(at->place, at->path, interfaces::quote(name) + " is on a joint, so that no hand can hold it",
-                    "push it, or let a robot body pull it");
+                    "push it, pull it, or move its joint (move_joint)");
     return name;
+  }
+
+  void force(Binder& fields, belief::ScalarDistribution& force) {
+    if (const LocatedValue* at = fields.find("force")) force = read_scalar(*at, problems_, kForce, true);
+  }
+
+  void point(Binder& fields, std::string_view key, std::optional<Vector3d>& point) {
+    if (const LocatedValue* at = fields.find(key)) point = read_vector(*at, problems_, kPosition);
+  }
+
+  double angle(Binder& fields) {
+    const LocatedValue* at = fields.require("angle_deg", "give by how many degrees it is turned");
+    return at ? geometry::kDegree * read_number(*at, problems_, kTurnedBy).value_or(0.0) : 0.0;
   }
 
   // The name of an object that is held now.
@@ -112,11 +142,7 @@ class ActionReader {
     belief::Pour pour;
     pour.container = held_name(fields, "container");
     if (const LocatedValue* at = fields.find("axis")) pour.axis_W = read_axis(*at, problems_);
-    double angle_deg = 0.0;
-    if (const LocatedValue* at = fields.require("angle_deg", "give by how many degrees it is turned"))
-      angle_deg =
-          read_number(*at, problems_, {-360.0, 360.0, "give degrees between -360 and 360", "deg"}).value_or(0.0);
-    pour.angle = geometry::kDegree * angle_deg;
+    pour.angle = angle(fields);
     fields.read("duration", pour.duration, kDuration);
     return pour;
   }
@@ -126,7 +152,74 @@ class ActionReader {
     if (const LocatedValue* at = fields.require("hand", "name one of the scene's robot bodies"))
       grasp.hand = context_.read_name(*at, context_.robot, "a robot body");
     held_.insert(grasp.object);
+    const LocatedValue* force = fields.find("grip_force");
+    const LocatedValue* friction = fields.find("finger_friction");
+    const LocatedValue* length = fields.find("pad_length");
+    if (const LocatedValue* other = friction ? friction : length; other && !force)
+      problems_.add(other->place, other->path, "it is of a grip that may slip, which is not given",
+                    "give 'grip_force', too, or leave it out");
+    if (!force) return grasp;
+    belief::Grip& grip = grasp.grip.emplace();
+    grip.force = read_scalar(*force, problems_, kForce, true);
+    if (friction) grip.friction = read_scalar(*friction, problems_, kFriction, true);
+    if (length) grip.pad_length = read_number(*length, problems_, kObjectSize).value_or(grip.pad_length);
     return grasp;
+  }
+  belief::Bump read_bump(Binder& fields) {
+    belief::Bump bump;
+    bump.object = any_object(fields);
+    if (const LocatedValue* at = fields.require("impulse", "give the impulse [x, y, z] in the world, N s"))
+      bump.impulse = read_vector_distribution(*at, problems_, kImpulse);
+    point(fields, "point", bump.point_O);
+    return bump;
+  }
+  belief::Tilt read_tilt(Binder& fields) {
+    belief::Tilt tilt;
+    tilt.object = held_name(fields, "object");
+    if (const LocatedValue* at = fields.find("axis")) tilt.axis_W = read_axis(*at, problems_);
+    tilt.angle = angle(fields);
+    if (const LocatedValue* at = fields.find("pivot")) tilt.pivot_O = read_vector(*at, problems_, kPosition);
+    fields.read("duration", tilt.duration, kDuration);
+    return tilt;
+  }
+  belief::Pull read_pull(Binder& fields) {
+    belief::Pull pull;
+    pull.object = any_object(fields);
+    pull.by = vector(fields, "by", "give how far the hand moves [x, y, z], m");
+    fields.read("duration", pull.duration, kDuration);
+    force(fields, pull.force);
+    point(fields, "point", pull.point_O);
+    return pull;
+  }
+  belief::MoveJoint read_move_joint(Binder& fields) {
+    belief::MoveJoint move;
+    std::vector<std::string> names;
+    for (const belief::Joint& joint : context_.scene.joints) names.push_back(joint.name);
+    if (const LocatedValue* at = fields.require("joint", "name one of the scene's joints"))
+      move.joint = context_.read_name(*at, names, "a joint");
+    if (const auto index = belief::find_joint(context_.scene, move.joint))
+      move.type = context_.scene.joints[static_cast<std::size_t>(*index)].type;
+    const bool hinge = move.type == belief::JointType::kHinge;
+    if (const LocatedValue* at = hinge ? fields.require("to_deg", "give the position of the hinge in degrees")
+                                       : fields.require("to", "give the position of the slider in m"))
+      move.to =
+          (hinge ? geometry::kDegree : 1.0) * read_number(*at, problems_, hinge ? kTurnedBy : kPosition).value_or(0.0);
+    fields.read("duration", move.duration, kDuration);
+    force(fields, move.force);
+    point(fields, "handle", move.handle_C);
+    return move;
+  }
+  belief::Insert read_insert(Binder& fields) {
+    belief::Insert insert;
+    insert.object = held_name(fields, "object");
+    if (const LocatedValue* at = fields.find("axis")) insert.axis_W = read_axis(*at, problems_);
+    if (const LocatedValue* at = fields.require("distance", "give how far it is moved in, m"))
+      insert.distance = read_number(*at, problems_, kObjectSize).value_or(insert.distance);
+    fields.read("duration", insert.duration, kDuration);
+    force(fields, insert.force);
+    if (const LocatedValue* at = fields.find("torque")) insert.torque = read_scalar(*at, problems_, kTorque, true);
+    held_.erase(insert.object);
+    return insert;
   }
 
   SceneContext& context_;

@@ -50,8 +50,7 @@ std::optional<std::string> holder_at(const Scene& scene, const belief::SceneObje
   for (const Action& action : scene.actions) {
     if (action.time > time || belief::object_of(action) != object.name) continue;
     if (const auto* grasp = std::get_if<belief::Grasp>(&action.what)) holder = grasp->hand;
-    if (std::holds_alternative<belief::Release>(action.what) || std::holds_alternative<belief::Place>(action.what))
-      holder.reset();
+    if (belief::lets_go(action)) holder.reset();
   }
   return holder;
 }
@@ -79,15 +78,7 @@ using Present = std::vector<std::optional<ObjectState>>;
 /// What is random in the actions, drawn once for all parts.
 void fix_actions(core::RandomStream stream, std::vector<Action>& actions) {
   const auto drawn = simulation::draw_actions(actions, stream);
-  for (std::size_t i = 0; i < actions.size(); ++i) {
-    if (auto* place = std::get_if<belief::Place>(&actions[i].what)) place->X_WO = belief::FixedPose{drawn[i].goal};
-    if (auto* move = std::get_if<belief::Transport>(&actions[i].what)) move->X_WO = belief::FixedPose{drawn[i].goal};
-    if (auto* push = std::get_if<belief::Push>(&actions[i].what))
-      push->lateral_error = belief::FixedScalar{drawn[i].sideways};
-    if (auto* release = std::get_if<belief::Release>(&actions[i].what))
-      release->disturbance = {belief::Vector3Distribution::fixed(drawn[i].disturbance.angular),
-                              belief::Vector3Distribution::fixed(drawn[i].disturbance.linear)};
-  }
+  for (std::size_t i = 0; i < actions.size(); ++i) simulation::fix_draws(drawn[i], actions[i]);
 }
 
 /// What is left of an action at `time`, as one that begins then or later; empty: nothing.

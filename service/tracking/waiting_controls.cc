@@ -33,6 +33,11 @@ core::TimeNs sent_in_time_of_frames(core::TimeNs sent_ns, core::TimeNs frame_ns)
   return std::abs(sent_ns - frame_ns) <= kSameClockNs ? sent_ns : frame_ns;
 }
 
+/// The hand keeps the object until the end of the action, and lets go of it then.
+bool ends_free(const belief::Action& action) {
+  return std::holds_alternative<belief::Place>(action.what) || std::holds_alternative<belief::Insert>(action.what);
+}
+
 }  // namespace
 
 core::Result<ParsedControl> parse_control(const std::string& text) {
@@ -60,10 +65,11 @@ core::Result<ParsedControl> parse_control(const std::string& text) {
     // An hour bounds what is plausible, and keeps the sum in range.
     if (!(std::abs(action.time) <= kLongestAhead))
       return core::invalid_input("time: actions start within an hour of their control");
-    if (std::holds_alternative<belief::Place>(action.what)) {
+    if (ends_free(action)) {
       const double takes = belief::duration_of(action);
       if (!(takes > 0.0 && takes <= kLongestAhead))
-        return core::invalid_input("place: duration: a time above 0 s and of at most an hour is needed");
+        return core::invalid_input(belief::kind_of(action) +
+                                   ": duration: a time above 0 s and of at most an hour is needed");
     }
     control.actions.emplace_back(core::ns_of(action.time), std::move(action));
   }
@@ -71,7 +77,7 @@ core::Result<ParsedControl> parse_control(const std::string& text) {
 }
 
 core::TimeNs placement_time(const belief::Action& action) {
-  return std::holds_alternative<belief::Place>(action.what) ? core::ns_of(belief::duration_of(action)) : 0;
+  return ends_free(action) ? core::ns_of(belief::duration_of(action)) : 0;
 }
 
 IdleControls idle_controls(const belief::Scene& scene, const belief::Control& control) {
@@ -81,10 +87,15 @@ IdleControls idle_controls(const belief::Scene& scene, const belief::Control& co
   IdleControls idle;
   for (const belief::Action& action : control.actions) {
     const std::string object = belief::object_of(action);
-    if (object.empty()) continue;  // a push needs none
+    const bool is_force = std::holds_alternative<belief::Bump>(action.what) ||
+                          std::holds_alternative<belief::Pull>(action.what) ||
+                          std::holds_alternative<belief::MoveJoint>(action.what);
+    if (object.empty() && !is_force) continue;  // a push needs none
     const auto* grasp = std::get_if<belief::Grasp>(&action.what);
     std::string why;
-    if (!belief::find_object(scene, object))
+    if (is_force)
+      why = "the tracker follows what is seen of it";
+    else if (!belief::find_object(scene, object))
       why = "the scene has no such object";
     else if (grasp != nullptr && !belief::find_robot_body(scene, grasp->hand))
       why = "the scene has no robot body " + interfaces::quote(grasp->hand);
@@ -96,7 +107,7 @@ IdleControls idle_controls(const belief::Scene& scene, const belief::Control& co
           "the action '" + belief::kind_of(action) + "' of " + interfaces::quote(object) + " changes nothing: " + why;
     } else if (grasp != nullptr) {
       held.insert(object);
-    } else if (std::holds_alternative<belief::Release>(action.what)) {
+    } else if (belief::lets_go(action)) {
       held.erase(object);
     }
   }
@@ -135,7 +146,7 @@ core::Status WaitingControls::take_in(const interfaces::ReceivedMessage& message
     std::erase_if(waiting_, [&](const Waiting& waiting) {
       return waiting.ends_place && belief::object_of(waiting.action) == object;
     });
-    const bool is_place = std::holds_alternative<belief::Place>(action.what);
+    const bool is_place = ends_free(action);
     if (is_place) {
       after_ns += placement_time(action);
       action.what = belief::Release{object};

@@ -144,8 +144,8 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
     c.restitution = pair.restitution;
     c.rolling_arm = pair.rolling_arm;
     c.turning = point.turning;
-    c.speed_before = point.normal.dot(ma.velocity_before + ma.spin.cross(point.position - ma.p_WCm) -
-                                      mb.velocity_before - mb.spin.cross(point.position - mb.p_WCm)) +
+    c.speed_before = point.normal.dot(ma.velocity_before + ma.spin_before.cross(point.position - ma.p_WCm) -
+                                      mb.velocity_before - mb.spin_before.cross(point.position - mb.p_WCm)) +
                      point.turning;
     const Vector3d p_B = mb.X_WO.inverse_times(point.position);
     double nearest = reach * reach;
@@ -166,6 +166,13 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
 /// How fast the normal velocity of a contact grows while nothing presses, m/s^2.
 double InstanceWorld::free_acceleration(const SolverContact& c) const {
   const auto falls = [&](int body) { return moving_[static_cast<std::size_t>(body)].dynamic ? 1.0 : 0.0; };
+  if (any_loaded_) {
+    const auto pulled = [&](int body) {
+      const bool moves = moving_[static_cast<std::size_t>(body)].dynamic;
+      return moves ? pull_on(objects_[static_cast<std::size_t>(body)]) : Vector3d(Vector3d::Zero());
+    };
+    return c.normal.dot(pulled(c.body_a) - pulled(c.body_b));
+  }
   return (falls(c.body_a) - falls(c.body_b)) * c.normal.dot(scene_->scene.gravity_W);
 }
 

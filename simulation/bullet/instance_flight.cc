@@ -23,11 +23,11 @@ constexpr double kFastest = 1e3;
 
 InstanceWorld::Flight InstanceWorld::flight_of(const Object& object, const CompiledBody& body) const {
   // Without contact a step ends here.
-  const Vector3d& gravity = scene_->scene.gravity_W;
   Flight flight;
-  flight.v_WCm = object.v_WCm + part_ * gravity;
+  flight.v_WCm = object.v_WCm + part_ * pull_on(object);
   flight.p_WCm = object.p_WCm + 0.5 * part_ * (object.v_WCm + flight.v_WCm);
-  const Spin spin = spun(object.R_WO, object.w_WO, body, part_);
+  const Vector3d w_WO = object.loaded ? Vector3d(object.w_WO + part_ * object.spin_up) : object.w_WO;
+  const Spin spin = spun(object.R_WO, w_WO, body, part_);
   flight.R_WO = spin.R_WO;
   flight.w_WO = spin.w_WO;
   return flight;
@@ -92,7 +92,7 @@ bool InstanceWorld::clear_for(int steps, double world_radius) {
 
 int InstanceWorld::fly(int most, double world_radius) {
   if (!scene_->joints.empty()) return 0;
-  if (most < kShortest || !contacts_.empty() || !player_.over(time()) || !list_flyers()) return 0;
+  if (most < kShortest || !contacts_.empty() || any_loaded_ || !player_.over(time()) || !list_flyers()) return 0;
   if (scene_->robot_count > 0 || player_.pusher_count() > 0) place_kinematic();
   int steps = std::min(most, kLongest);
   while (steps >= kShortest && !clear_for(steps, world_radius)) steps /= 2;

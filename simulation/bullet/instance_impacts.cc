@@ -12,7 +12,8 @@ namespace prescene::simulation {
 void InstanceWorld::set_part(int parts) { part_ = dt() * (static_cast<double>(parts) / kStepParts); }
 
 int InstanceWorld::splits_allowed() const {
-  if (!scene_->joints.empty()) return 0;  // joints are aimed at the end of a whole step
+  // Joints are aimed at the end of a whole step, and hands do what the whole step takes.
+  if (!scene_->joints.empty() || any_loaded_) return 0;
   int moving = 0;
   for (std::size_t i = 0; i < moving_.size(); ++i) {
     const Moving& m = moving_[i];

@@ -66,7 +66,9 @@ bool InstanceWorld::restore(ByteReader& in) {
     object.calm_steps = in.value<int>();
     object.held = in.value<bool>();
     object.frozen = in.value<bool>();
+    object.loaded = false;
   }
+  any_loaded_ = false;
   for (std::uint8_t& parting : parting_) parting = in.value<std::uint8_t>();
   const auto count = in.value<std::uint32_t>();
   if (!in.ok() || count > in.left()) return false;

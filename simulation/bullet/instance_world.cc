@@ -68,6 +68,7 @@ void InstanceWorld::reset(const belief::WorldState& given_start, const std::vect
   contacts_.clear();
   contact_keys_.clear();
   touches_.clear();
+  any_loaded_ = false;
   player_.reset(actions, start, stream);
   objects_.assign(start.objects.size(), Object{});
   for (std::size_t i = 0; i < objects_.size(); ++i) {
@@ -146,7 +147,13 @@ void InstanceWorld::run_actions() {
   for (const Object& object : objects_) poses_.push_back(object_pose(object));
   released_.clear();
   player_.advance(time(), dt(), poses_, released_);
-  for (const ActionPlayer::Released& event : released_) {
+  set_free(released_);
+  if (any_loaded_ || player_.has_loads(time())) load_objects();
+  for (std::size_t i = 0; i < objects_.size(); ++i) objects_[i].held = player_.kinematic(static_cast<int>(i));
+}
+
+void InstanceWorld::set_free(const std::vector<ActionPlayer::Released>& released) {
+  for (const ActionPlayer::Released& event : released) {
     Object& object = objects_[static_cast<std::size_t>(event.object)];
     object.w_WO = event.V_WO.angular;
     object.v_WCm = event.V_WO.linear + event.V_WO.angular.cross(object.R_WO * object.physical.center_of_mass);
@@ -155,7 +162,39 @@ void InstanceWorld::run_actions() {
       parting_[static_cast<std::size_t>(event.object * scene_->robot_count + r)] = 1;
     }
   }
-  for (std::size_t i = 0; i < objects_.size(); ++i) objects_[i].held = player_.kinematic(static_cast<int>(i));
+}
+
+void InstanceWorld::load_objects() {
+  any_loaded_ = false;
+  felt_.clear();
+  for (Object& object : objects_) {
+    object.loaded = false;
+    object.acceleration = object.spin_up = Vector3d::Zero();
+    felt_.push_back(
+        {object_pose(object), object.p_WCm, object.v_WCm, object.w_WO, object.physical.mass, object.physical.friction});
+  }
+  if (!player_.has_loads(time())) return;
+  const std::size_t freed = released_.size();
+  loads_.clear();
+  player_.load(time(), dt(), felt_, released_, loads_);
+  set_free({released_.begin() + static_cast<std::ptrdiff_t>(freed), released_.end()});
+  for (const ActionPlayer::Load& load : loads_) {
+    Object& object = objects_[static_cast<std::size_t>(load.object)];
+    if (object.frozen) continue;
+    const CompiledBody& body = scene_->bodies[static_cast<std::size_t>(load.object)];
+    const Vector3d velocity = load.impulse / object.physical.mass;
+    const Vector3d spin = world_inertia(object.R_WO, body, object.physical.mass).inverse() * load.turn;
+    object.calm_steps = 0;
+    if (load.blow) {
+      object.v_WCm += velocity;
+      object.w_WO += spin;
+      continue;
+    }
+    any_loaded_ = object.loaded = true;
+    object.acceleration += velocity / dt();
+    object.spin_up += spin / dt();
+    if (load.keeps_attitude) object.w_WO = load.spin;
+  }
 }
 
 void InstanceWorld::place_kinematic() {
@@ -167,7 +206,7 @@ void InstanceWorld::place_kinematic() {
     m.velocity = (X_next.translation - X_now.translation) / dt();
     m.spin = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt();
     m.velocity_before = m.velocity;
-    m.spin_after = m.spin;
+    m.spin_before = m.spin_after = m.spin;
     m.dynamic = false;
     m.present = true;
     sweep(body);
@@ -205,7 +244,8 @@ void InstanceWorld::place_dynamic() {
     m.p_WCm = object.p_WCm;
     m.velocity = flight.v_WCm;
     // Contacts act at the step's beginning, on the spin of there: its energy is that of this pose.
-    m.spin = object.w_WO;
+    m.spin = object.loaded ? Vector3d(object.w_WO + part_ * object.spin_up) : object.w_WO;
+    m.spin_before = object.w_WO;
     m.velocity_before = object.v_WCm;
     m.spin_after = flight.w_WO;
     sweep(static_cast<int>(i));
@@ -245,7 +285,7 @@ void InstanceWorld::integrate() {
       const Impact& impact = impacts_[i];
       const double before = impact.time.value_or(0.0);
       const double after = part_ - before;
-      const Vector3d& gravity = scene_->scene.gravity_W;
+      const Vector3d gravity = pull_on(object);
       const double falls_before = impact.supported ? 0.0 : 0.5 * before;
       const double falls_after = impact.supported || !impact.bounced ? 0.0 : -0.5 * after;
       const Vector3d flown = before * (object.v_WCm + falls_before * gravity);
@@ -254,7 +294,7 @@ void InstanceWorld::integrate() {
       const Vector3d w = from_bullet(rigid_[i]->getAngularVelocity());
       const CompiledBody& body = scene_->bodies[i];
       const Spin spin =
-          turned(spun(object.R_WO, w, body, part_), before * (object.w_WO - w) + part_ * result.turn, body);
+          turned(spun(object.R_WO, w, body, part_), before * (moving_[i].spin - w) + part_ * result.turn, body);
       object.R_WO = spin.R_WO;
       object.w_WO = spin.w_WO;
     } else {

@@ -63,7 +63,7 @@ class InstanceWorld {
   double energy(int object) const;
   /// Steps in a row for which the object's energy was below the rest rule's.
   int calm_steps(int object) const { return objects_[static_cast<std::size_t>(object)].calm_steps; }
-  bool actions_finished() const { return player_.finished(time()); }
+  bool actions_finished() const { return player_.over(time()); }
   const CompiledScene& scene() const { return *scene_; }
 
   /// Position of the centre of mass, W.
@@ -104,6 +104,10 @@ class InstanceWorld {
     int calm_steps = 0;
     bool held = false;
     bool frozen = false;
+    // Of this step: what hands do to it, m/s^2 and rad/s^2.
+    bool loaded = false;
+    Vector3d acceleration = Vector3d::Zero();
+    Vector3d spin_up = Vector3d::Zero();
   };
   struct Flight {
     Vector3d p_WCm, v_WCm, w_WO;
@@ -115,10 +119,11 @@ class InstanceWorld {
     Vector3d p_WCm = Vector3d::Zero();  // what velocities refer to
     Vector3d velocity = Vector3d::Zero();
     Vector3d spin = Vector3d::Zero();
-    Vector3d velocity_before = Vector3d::Zero();  // without this step's gravity
-    Vector3d spin_after = Vector3d::Zero();       // with nothing in the way
-    Vector3d low, high;                           // bounding box swept over the step
-    double travel = 0.0;                          // bound of any point's way in the step, m
+    Vector3d velocity_before = Vector3d::Zero();  // without this step's gravity and hands
+    Vector3d spin_before = Vector3d::Zero();
+    Vector3d spin_after = Vector3d::Zero();  // with nothing in the way
+    Vector3d low, high;                      // bounding box swept over the step
+    double travel = 0.0;                     // bound of any point's way in the step, m
     bool present = true;
     bool dynamic = false;
   };
@@ -165,6 +170,12 @@ class InstanceWorld {
   int body_count() const { return static_cast<int>(scene_->bodies.size()) + player_.pusher_count(); }
   Pose object_pose(const Object& object) const;
   void run_actions();
+  void set_free(const std::vector<ActionPlayer::Released>& released);
+  void load_objects();
+  /// Gravity, and what a hand does to it.
+  Vector3d pull_on(const Object& object) const {
+    return object.loaded ? Vector3d(scene_->scene.gravity_W + object.acceleration) : scene_->scene.gravity_W;
+  }
   void place_kinematic();
   void place_dynamic();
   /// After what is taken of a step now.
@@ -248,6 +259,9 @@ class InstanceWorld {
   std::vector<Vector3d> footprint_;
   std::vector<Pose> poses_;
   std::vector<ActionPlayer::Released> released_;
+  std::vector<ActionPlayer::Body> felt_;
+  std::vector<ActionPlayer::Load> loads_;
+  bool any_loaded_ = false;
   std::vector<CompiledBody> pushers_;
 };
 

@@ -181,7 +181,13 @@ core::Status validate(const LockstepOptions& options) {
   return core::ok_status();
 }
 
-core::Status check_pushers(const std::vector<belief::Action>& actions) {
+core::Status check_actions(const std::vector<belief::Action>& actions) {
+  for (const belief::Action& action : actions) {
+    const bool drives = std::holds_alternative<belief::Pull>(action.what) ||
+                        std::holds_alternative<belief::MoveJoint>(action.what) ||
+                        std::holds_alternative<belief::Insert>(action.what);
+    if (drives) return core::unsupported("the action " + belief::kind_of(action) + " is not simulated in lockstep");
+  }
   const std::size_t pushers = pusher_radii(actions).size();
   if (pushers <= kMostPushers) return core::ok_status();
   return core::unsupported(std::to_string(pushers) + " push actions are more than the " + std::to_string(kMostPushers) +
@@ -220,7 +226,7 @@ core::Result<std::shared_ptr<const CompiledLockstep>> compile_lockstep(const bel
   }
   if (!scene.joints.empty())
     return core::unsupported("the joint " + scene.joints.front().name + " is not simulated in lockstep");
-  PRESCENE_RETURN_IF_ERROR(check_pushers(scene.actions));
+  PRESCENE_RETURN_IF_ERROR(check_actions(scene.actions));
   auto compiled = std::make_shared<CompiledLockstep>();
   compiled->scene = scene;
   compiled->options = options;

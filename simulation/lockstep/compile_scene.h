@@ -25,8 +25,8 @@ struct CompiledLockstep {
 };
 
 std::vector<double> pusher_radii(const std::vector<belief::Action>& actions);
-/// kUnsupported where there are more push actions than lanes have room for.
-core::Status check_pushers(const std::vector<belief::Action>& actions);
+/// kUnsupported where there are more push actions than lanes have room for, or hands that drive what has contacts.
+core::Status check_actions(const std::vector<belief::Action>& actions);
 /// A copy that has the balls of push actions, too.
 std::shared_ptr<const CompiledLockstep> with_pushers(const CompiledLockstep& compiled,
                                                      const std::vector<double>& radii);

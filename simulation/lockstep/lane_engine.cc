@@ -229,6 +229,23 @@ void LaneEngine::release(int slot, int object, const Pose& X_WO, const geometry:
   }
 }
 
+void LaneEngine::strike(int slot, int object, double mass, const Vector3d& impulse, const Vector3d& turn,
+                        double within) {
+  if (motion(slot, object) == LaneMotion::kAsleep) set_motion(slot, object, LaneMotion::kFree);
+  if (!free(slot, object)) return;
+  const int at = state_.at(object, slot);
+  const auto& moments = scene_->lanes.bodies[static_cast<std::size_t>(object)].unit_moments;
+  const Quaterniond R_WP = rotation(slot, object);
+  const Vector3d spin_P = (R_WP.conjugate() * turn).cwiseQuotient(mass * Vector3d(moments[0], moments[1], moments[2]));
+  set_vector(state_.v, at, vector_at(state_.v, at) + impulse / mass);
+  if (within > 0.0) set_vector(state_.p, at, vector_at(state_.p, at) - 0.5 * within * impulse / mass);
+  set_vector(state_.w, at, vector_at(state_.w, at) + R_WP * spin_P);
+}
+
+void LaneEngine::turn_with(int slot, int object, const Vector3d& w_WO) {
+  if (free(slot, object)) set_vector(state_.w, state_.at(object, slot), w_WO);
+}
+
 void LaneEngine::freeze(int slot, int object) {
   const int at = state_.at(object, slot);
   for (std::size_t i = 0; i < 3; ++i) state_.v[i][at] = state_.w[i][at] = Real(0);

@@ -56,6 +56,12 @@ class LaneEngine {
   void arrive(int slot, int object);
   /// Free from now on. It does not touch kinematic bodies that it overlaps before they have parted.
   void release(int slot, int object, const geometry::Pose& X_WO, const geometry::Twist& V_WO);
+  /// Changes the momentum (N s) of an object of that mass and its angular momentum about its centre of mass (N m s), if
+  /// it is free or asleep, which it is no longer then. `within` is over what part of the step (s): 0 = at once; else it
+  /// goes as far as if it were done evenly.
+  void strike(int slot, int object, double mass, const Vector3d& impulse, const Vector3d& turn, double within);
+  /// Sets the spin of a free object, rad/s.
+  void turn_with(int slot, int object, const Vector3d& w_WO);
   /// Has left the world: stays where it is and touches nothing.
   void freeze(int slot, int object);
   /// At rest: stays where it is, with the contacts of this step, and nothing of it is computed until another object

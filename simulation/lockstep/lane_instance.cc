@@ -45,13 +45,40 @@ void LaneInstance::run_due(LaneEngine& engine, int slot) {
   }
   released_.clear();
   player_.advance(now, dt_, poses_, released_);
+  set_free(engine, slot);
+  next_due_ = player_.next_due();
+}
+
+void LaneInstance::set_free(LaneEngine& engine, int slot) {
   began_ = began_ || !released_.empty();
   for (const ActionPlayer::Released& event : released_) {
     const auto object = static_cast<std::size_t>(event.object);
     engine.release(slot, event.object, poses_[object], event.V_WO);
     calm_steps_[object] = 0;
   }
-  next_due_ = player_.next_due();
+}
+
+void LaneInstance::load(LaneEngine& engine, int slot) {
+  const double now = time();
+  poses_.clear();
+  felt_.clear();
+  for (int i = 0; i < engine.objects(); ++i) {
+    belief::ObjectState object = start_->objects[static_cast<std::size_t>(i)];
+    engine.read(slot, i, object);
+    if (player_.kinematic(i)) object.X_WO = player_.object_pose(i, now);
+    poses_.push_back(object.X_WO);
+    felt_.push_back({object.X_WO, object.X_WO * object.physical.center_of_mass, engine.velocity(slot, i),
+                     object.V_WO.angular, object.physical.mass, object.physical.friction});
+  }
+  released_.clear();
+  loads_.clear();
+  player_.load(now, dt_, felt_, released_, loads_);
+  set_free(engine, slot);
+  for (const ActionPlayer::Load& load : loads_) {
+    engine.strike(slot, load.object, mass(load.object), load.impulse, load.turn, load.blow ? 0.0 : dt_);
+    if (load.keeps_attitude) engine.turn_with(slot, load.object, load.spin);
+    calm_steps_[static_cast<std::size_t>(load.object)] = 0;
+  }
 }
 
 void LaneInstance::before_step(LaneEngine& engine, int slot) {
@@ -60,6 +87,7 @@ void LaneInstance::before_step(LaneEngine& engine, int slot) {
   const double now = time();
   // As ActionPlayer::advance: times are met to the nearest step.
   if (next_due_ <= now + 0.5 * dt_) run_due(engine, slot);
+  if (player_.has_loads(now)) load(engine, slot);
   for (std::size_t i = 0; i < scene_->robot_bodies.size(); ++i) {
     const int body = scene_->robot_bodies[i];
     const int robot = static_cast<int>(i);
@@ -97,7 +125,7 @@ void LaneInstance::after_step(LaneEngine& engine, int slot) {
 }
 
 std::int64_t LaneInstance::skip_held(LaneEngine& engine, int slot, std::int64_t most) {
-  if (settled_ || most < 2) return 0;
+  if (settled_ || most < 2 || player_.has_loads(time())) return 0;
   for (int i = 0; i < engine.objects(); ++i) {
     if (!player_.kinematic(i) || engine.motion(slot, i) == LaneMotion::kFrozen) return 0;
   }

@@ -40,8 +40,10 @@ class LaneInstance {
 
  private:
   double time_at(std::int64_t step) const { return start_->time + static_cast<double>(step) * dt_; }
-  bool over() const { return !acts_ || (time() >= finish_time_ && std::isinf(next_due_)); }
+  bool over() const { return !acts_ || (time() >= finish_time_ && std::isinf(next_due_) && !player_.slides()); }
   void run_due(LaneEngine& engine, int slot);
+  void load(LaneEngine& engine, int slot);
+  void set_free(LaneEngine& engine, int slot);
 
   const CompiledLockstep* scene_;
   double dt_;
@@ -56,6 +58,8 @@ class LaneInstance {
   bool settled_ = false;  // nothing is moved from now on, and all is placed
   std::vector<geometry::Pose> poses_;
   std::vector<ActionPlayer::Released> released_;
+  std::vector<ActionPlayer::Body> felt_;
+  std::vector<ActionPlayer::Load> loads_;
 };
 
 }  // namespace prescene::simulation

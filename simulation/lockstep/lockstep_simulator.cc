@@ -16,7 +16,7 @@
 namespace prescene::simulation {
 namespace {
 
-constexpr std::uint32_t kSnapshotVersion = 0x4c4b0004;
+constexpr std::uint32_t kSnapshotVersion = 0x4c4b0005;
 
 core::Status wrong_snapshot() {
   return core::invalid_input(
@@ -224,7 +224,7 @@ class LockstepSimulator : public Simulator, public OwnActionsRunner {
  public:
   explicit LockstepSimulator(std::shared_ptr<const CompiledLockstep> scene) : scene_(std::move(scene)) {}
 
-  core::Status supports(const RunRequest& request) const override { return check_pushers(request.actions); }
+  core::Status supports(const RunRequest& request) const override { return check_actions(request.actions); }
   StepperUse stepper() const override { return {"lockstep", "", scene_->hull_error}; }
 
   void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
@@ -250,7 +250,7 @@ class LockstepSimulator : public Simulator, public OwnActionsRunner {
     // Those with the same balls are of one scene.
     std::map<std::vector<double>, std::vector<std::size_t>> groups;
     for (std::size_t i = 0; i < starts.size(); ++i) {
-      PRESCENE_CHECK(check_pushers(actions[i]).ok());
+      PRESCENE_CHECK(check_actions(actions[i]).ok());
       groups[pusher_radii(actions[i])].push_back(i);
     }
     for (const auto& [radii, members] : groups) {
@@ -270,7 +270,7 @@ class LockstepSimulator : public Simulator, public OwnActionsRunner {
   double step_size() const override { return scene_->options.step; }
   std::unique_ptr<Instance> make_instance(const std::vector<belief::Action>& actions,
                                           const core::RandomStream& stream) const override {
-    PRESCENE_CHECK(check_pushers(actions).ok());
+    PRESCENE_CHECK(check_actions(actions).ok());
     return std::make_unique<LockstepInstance>(scene_for(actions), actions, stream);
   }
 

@@ -44,11 +44,19 @@ std::vector<belief::Action> actions_of(const std::vector<belief::Action>& action
   return own;
 }
 
-/// When something comes from nowhere.
+/// What drives objects otherwise than hands that hold them rigidly: their poses have no common flight from then on.
+bool drives(const belief::Action& action) {
+  const auto* grasp = std::get_if<belief::Grasp>(&action.what);
+  return (grasp != nullptr && grasp->grip) || std::holds_alternative<belief::Bump>(action.what) ||
+         std::holds_alternative<belief::Pull>(action.what) || std::holds_alternative<belief::MoveJoint>(action.what) ||
+         std::holds_alternative<belief::Insert>(action.what);
+}
+
+/// When something comes from nowhere, or is driven.
 double first_push(const std::vector<belief::Action>& actions) {
   double first = std::numeric_limits<double>::infinity();
   for (const belief::Action& action : actions)
-    if (std::holds_alternative<belief::Push>(action.what)) first = std::min(first, action.time);
+    if (std::holds_alternative<belief::Push>(action.what) || drives(action)) first = std::min(first, action.time);
   return first;
 }
 

@@ -10,6 +10,9 @@
 namespace prescene::simulation {
 namespace {
 
+// s: what a grip holds feels that its hand stops in the step after; longer than any step.
+constexpr double kFelt = 0.05;
+
 /// Horizontal unit vector to the left of a direction of travel; zero when it is vertical.
 Vector3d left_of(const Vector3d& travel) {
   const Vector3d left = Vector3d::UnitZ().cross(travel);
@@ -26,8 +29,16 @@ void ActionPlayer::reset(const std::vector<belief::Action>& actions, const belie
   drawn_ = draw_actions(actions_, stream);
   steps_.assign(actions_.size(), Step{});
   pushers_.clear();
+  bumps_.clear();
+  drives_.clear();
+  grips_ = false;
   for (std::size_t i = 0; i < actions_.size(); ++i) {
     const belief::Action& action = actions_[i];
+    const auto* grasp = std::get_if<belief::Grasp>(&action.what);
+    grips_ = grips_ || (grasp != nullptr && grasp->grip);
+    if (std::holds_alternative<belief::Pull>(action.what) || std::holds_alternative<belief::MoveJoint>(action.what) ||
+        std::holds_alternative<belief::Insert>(action.what))
+      drives_.push_back(i);
     if (const auto* push = std::get_if<belief::Push>(&action.what)) {
       const Vector3d shift = drawn_[i].sideways * left_of(push->to - push->from);
       pushers_.push_back({push->from + shift, push->to + shift, action.time, push->duration, push->radius});
@@ -56,7 +67,7 @@ Pose ActionPlayer::robot_pose(int robot, double time) const {
   const Hand& hand = hands_[static_cast<std::size_t>(robot)];
   if (hand.carries >= 0) {
     const Hold& hold = objects_[static_cast<std::size_t>(hand.carries)];
-    return carried_pose(hold, time) * hold.X_GO.inverse();
+    return carrying_pose(hold, time) * hold.X_GO.inverse();
   }
   Pose X_WG = hand.stays ? hand.X_WG_stay : timeline_pose(robot, time);
   for (std::size_t i = 0; i < actions_.size(); ++i) {
@@ -76,10 +87,28 @@ Pose ActionPlayer::carried_pose(const Hold& hold, double time) const {
     X_WO.rotation = geometry::exp_rotation(share * pour->angle * axis) * hold.X_from.rotation;
     return X_WO;
   }
+  if (const auto* tilt = std::get_if<belief::Tilt>(&actions_[index].what))
+    return belief::turned_about(hold.X_from, tilt->pivot_O, tilt->axis_W, share * tilt->angle);
+  if (const auto* insert = std::get_if<belief::Insert>(&actions_[index].what)) {
+    Pose X_WO = hold.X_from;
+    X_WO.translation +=
+        belief::moved_share(hold.begin, insert->duration, time) * insert->distance * insert->axis_W.normalized();
+    return X_WO;
+  }
   return geometry::interpolate(hold.X_from, drawn_[index].goal, share);
 }
 
+Pose ActionPlayer::carrying_pose(const Hold& hold, double time) const {
+  const bool inserts = std::holds_alternative<belief::Insert>(actions_[static_cast<std::size_t>(hold.action)].what);
+  return inserts ? hold.X_felt : carried_pose(hold, time);
+}
+
 Pose ActionPlayer::object_pose(int object, double time) const {
+  const Hold& hold = objects_[static_cast<std::size_t>(object)];
+  return hold.shifted ? planned_pose(object, time) * hold.X_PO : planned_pose(object, time);
+}
+
+Pose ActionPlayer::planned_pose(int object, double time) const {
   const Hold& hold = objects_[static_cast<std::size_t>(object)];
   if (hold.control == Control::kCarried || hold.control == Control::kPoured) return carried_pose(hold, time);
   return hold.hand >= 0 ? robot_pose(hold.hand, time) * hold.X_GO : hold.X_GO;
@@ -104,7 +133,7 @@ double ActionPlayer::finish_time() const {
   for (const belief::KinematicBody& body : scene_->robot) {
     if (body.timeline.size() > 1) last = std::max(last, body.timeline.back().time);
   }
-  return last;
+  return grips_ ? last + kFelt : last;
 }
 
 double ActionPlayer::next_due() const {
@@ -125,7 +154,8 @@ bool ActionPlayer::over(double time) const {
     return hold.control == Control::kCarried || hold.control == Control::kPoured;
   };
   return finished(time) && std::all_of(steps_.begin(), steps_.end(), done) &&
-         std::none_of(objects_.begin(), objects_.end(), moved);
+         std::none_of(objects_.begin(), objects_.end(), moved) &&
+         !slides();  // what sticks in a grip stays so while the hand rests
 }
 
 void ActionPlayer::advance(double time, double dt, const std::vector<Pose>& poses, std::vector<Released>& released) {
@@ -149,7 +179,7 @@ void ActionPlayer::finish_carry(int object, std::vector<Released>& released) {
   Hold& hold = objects_[static_cast<std::size_t>(object)];
   const auto index = static_cast<std::size_t>(hold.action);
   const double end = hold.begin + belief::duration_of(actions_[index]);
-  const Pose X_WO = carried_pose(hold, end);
+  const Pose X_WO = carrying_pose(hold, end);
   if (hold.hand >= 0) {
     Hand& hand = hands_[static_cast<std::size_t>(hold.hand)];
     hand.carries = -1;
@@ -159,9 +189,10 @@ void ActionPlayer::finish_carry(int object, std::vector<Released>& released) {
     hold.X_GO = X_WO;
   }
   hold.action = -1;
-  if (std::holds_alternative<belief::Place>(actions_[index].what)) {
+  if (belief::lets_go(actions_[index])) {
+    // What slides or is inserted is free already.
+    if (!hold.loose) released.push_back({object, Twist{}});
     hold = Hold{};
-    released.push_back({object, Twist{}});
   } else {
     hold.control = Control::kHeld;
   }
@@ -174,14 +205,11 @@ void ActionPlayer::execute(std::size_t index, double time, double dt, const std:
 
   if (const auto* release = std::get_if<belief::Release>(&action.what)) {
     const std::optional<int> object = object_of(release->object);
-    if (!object || !kinematic(*object)) return;
+    if (!object || objects_[static_cast<std::size_t>(*object)].control == Control::kFree) return;
     Hold& hold = objects_[static_cast<std::size_t>(*object)];
+    const bool loose = hold.loose;  // free already: only the hand opens
     // It leaves with the velocity that the hand is about to have, without the retreat that begins now.
-    const Pose& X_now = poses[static_cast<std::size_t>(*object)];
-    const Pose X_next = object_pose(*object, time + dt) * (object_pose(*object, time).inverse() * X_now);
-    Twist V_WO;
-    V_WO.linear = (X_next.translation - X_now.translation) / dt;
-    V_WO.angular = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt;
+    Twist V_WO = leaving(*object, time, dt, poses[static_cast<std::size_t>(*object)]);
     V_WO.linear += drawn_[index].disturbance.linear;
     V_WO.angular += drawn_[index].disturbance.angular;
     if (hold.hand >= 0) {
@@ -194,25 +222,43 @@ void ActionPlayer::execute(std::size_t index, double time, double dt, const std:
       steps_[index].hand = hold.hand;
     }
     hold = Hold{};
-    released.push_back({*object, V_WO});
+    if (!loose) released.push_back({*object, V_WO});
     return;
   }
   if (const auto* grasp = std::get_if<belief::Grasp>(&action.what)) {
     const std::optional<int> object = object_of(grasp->object);
     const std::optional<int> hand = belief::find_robot_body(*scene_, grasp->hand);
     if (!object || !hand) return;
+    for (std::size_t i = 0; i < hands_.size(); ++i) {  // what carried it stops here
+      Hand& other = hands_[i];
+      if (other.carries != *object) continue;
+      other.X_WG_stay = robot_pose(static_cast<int>(i), time);
+      other.stays = true;
+      other.carries = -1;
+    }
     Hold& hold = objects_[static_cast<std::size_t>(*object)];
     hold = Hold{};
     hold.control = Control::kHeld;
     hold.hand = *hand;
     hold.X_GO = robot_pose(*hand, time).inverse() * poses[static_cast<std::size_t>(*object)];
+    if (grasp->grip) {
+      hold.limit = 2.0 * drawn_[index].force * drawn_[index].friction.value_or(1.0);
+      hold.own_friction = drawn_[index].friction.has_value();
+      hold.pad_length = grasp->grip->pad_length;
+    }
+    return;
+  }
+  if (std::holds_alternative<belief::Bump>(action.what)) {
+    bumps_.push_back(index);
     return;
   }
   const auto carry = [&](const std::string& name, Control control) {
     const std::optional<int> object = object_of(name);
     if (!object) return;
     Hold& hold = objects_[static_cast<std::size_t>(*object)];
-    hold.X_from = poses[static_cast<std::size_t>(*object)];
+    // A hand goes as if nothing had slid in it.
+    hold.X_from = hold.shifted || hold.loose ? planned_pose(*object, time) : poses[static_cast<std::size_t>(*object)];
+    hold.X_felt = hold.X_from;
     hold.control = control;
     hold.action = static_cast<int>(index);
     hold.begin = time;
@@ -223,6 +269,24 @@ void ActionPlayer::execute(std::size_t index, double time, double dt, const std:
     carry(transport->object, Control::kCarried);
   }
   if (const auto* pour = std::get_if<belief::Pour>(&action.what)) carry(pour->container, Control::kPoured);
+  if (const auto* tilt = std::get_if<belief::Tilt>(&action.what)) carry(tilt->object, Control::kPoured);
+  if (const auto* insert = std::get_if<belief::Insert>(&action.what)) {
+    const std::optional<int> object = object_of(insert->object);
+    if (!object || objects_[static_cast<std::size_t>(*object)].lost) return;
+    // The hand gives way from now on: it drives the object, which is free otherwise.
+    if (kinematic(*object))
+      released.push_back({*object, leaving(*object, time, dt, poses[static_cast<std::size_t>(*object)])});
+    carry(insert->object, Control::kCarried);
+    objects_[static_cast<std::size_t>(*object)].loose = true;
+  }
+}
+
+Twist ActionPlayer::leaving(int object, double time, double dt, const Pose& X_now) const {
+  const Pose X_next = object_pose(object, time + dt) * (object_pose(object, time).inverse() * X_now);
+  Twist V_WO;
+  V_WO.linear = (X_next.translation - X_now.translation) / dt;
+  V_WO.angular = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt;
+  return V_WO;
 }
 
 void ActionPlayer::save(ByteWriter& out) const {
@@ -234,6 +298,11 @@ void ActionPlayer::save(ByteWriter& out) const {
     out.value(hold.action);
     out.value(hold.begin);
     out.pose(hold.X_from);
+    out.pose(hold.X_felt);
+    out.value(hold.limit);
+    out.value(hold.pad_length);
+    for (const bool flag : {hold.own_friction, hold.loose, hold.lost, hold.shifted}) out.value(flag);
+    out.pose(hold.X_PO);
   }
   for (const Hand& hand : hands_) {
     out.value(hand.carries);
@@ -243,6 +312,9 @@ void ActionPlayer::save(ByteWriter& out) const {
   for (const Step& step : steps_) {
     out.value(step.done);
     out.value(step.hand);
+    out.value(step.begun);
+    out.vector(step.from_W);
+    out.value(step.from);
   }
 }
 
@@ -255,6 +327,11 @@ void ActionPlayer::restore(ByteReader& in) {
     hold.action = in.value<int>();
     hold.begin = in.value<double>();
     hold.X_from = in.pose();
+    hold.X_felt = in.pose();
+    hold.limit = in.value<double>();
+    hold.pad_length = in.value<double>();
+    for (bool* flag : {&hold.own_friction, &hold.loose, &hold.lost, &hold.shifted}) *flag = in.value<bool>();
+    hold.X_PO = in.pose();
   }
   for (Hand& hand : hands_) {
     hand.carries = in.value<int>();
@@ -264,6 +341,9 @@ void ActionPlayer::restore(ByteReader& in) {
   for (Step& step : steps_) {
     step.done = in.value<bool>();
     step.hand = in.value<int>();
+    step.begun = in.value<bool>();
+    step.from_W = in.vector();
+    step.from = in.value<double>();
   }
 }
 

@@ -96,6 +96,40 @@ class MechanicsHasher {
   void operator()(const belief::Grasp& grasp) {
     text(grasp.object);
     text(grasp.hand);
+    if (grasp.grip) value(grasp.grip->pad_length);
+  }
+  void operator()(const belief::Bump& bump) {
+    text(bump.object);
+    point(bump.point_O);
+  }
+  void operator()(const belief::Tilt& tilt) {
+    text(tilt.object);
+    matrix(tilt.axis_W);
+    value(tilt.angle);
+    matrix(tilt.pivot_O);
+    value(tilt.duration);
+  }
+  void operator()(const belief::Pull& pull) {
+    text(pull.object);
+    matrix(pull.by);
+    value(pull.duration);
+    point(pull.point_O);
+  }
+  void operator()(const belief::MoveJoint& move) {
+    text(move.joint);
+    value(move.to);
+    value(move.duration);
+    point(move.handle_C);
+  }
+  void operator()(const belief::Insert& insert) {
+    text(insert.object);
+    matrix(insert.axis_W);
+    value(insert.distance);
+    value(insert.duration);
+  }
+  void point(const std::optional<geometry::Vector3d>& p) {
+    value(p.has_value());
+    if (p) matrix(*p);
   }
   void operator()(const belief::Transport& transport) {
     text(transport.object);
@@ -165,6 +199,10 @@ std::uint64_t mechanics_hash(const std::vector<belief::Action>& actions, const c
     hasher.matrix(drawn[i].disturbance.angular);
     hasher.matrix(drawn[i].disturbance.linear);
     hasher.value(drawn[i].sideways);
+    hasher.matrix(drawn[i].impulse);
+    hasher.value(drawn[i].force);
+    hasher.value(drawn[i].torque);
+    hasher.value(drawn[i].friction.value_or(-1.0));
   }
   return hasher.digest();
 }

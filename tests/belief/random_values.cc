@@ -80,7 +80,7 @@ Action random_action(RandomStream& stream) {
   Action action;
   action.time = stream.uniform(0.0, 2.0);
   const double duration = stream.uniform(0.1, 2.0);
-  switch (random_below(stream, 6)) {
+  switch (random_below(stream, 11)) {
     case 0: {
       Release release{"block", random_vector(stream), duration, {}};
       release.disturbance.linear = random_vector_distribution(stream);
@@ -99,9 +99,45 @@ Action random_action(RandomStream& stream) {
       action.what = Pour{"block", geometry::uniform_direction(stream),
                          geometry::kDegree * stream.uniform(-170.0, 170.0), duration};
       break;
-    case 4:
-      action.what = Grasp{"block", "hand"};
+    case 4: {
+      Grasp grasp{"block", "hand"};
+      if (random_below(stream, 2) == 1) grasp.grip = Grip{random_scalar(stream), {}, stream.uniform(0.01, 0.1)};
+      if (grasp.grip && random_below(stream, 2) == 1) grasp.grip->friction = random_scalar(stream);
+      action.what = grasp;
       break;
+    }
+    case 5: {
+      Bump bump{"block", random_vector_distribution(stream)};
+      if (random_below(stream, 2) == 1) bump.point_O = random_vector(stream);
+      action.what = bump;
+      break;
+    }
+    case 6:
+      action.what = Tilt{"block", geometry::uniform_direction(stream),
+                         geometry::kDegree * stream.uniform(-170.0, 170.0), random_vector(stream), duration};
+      break;
+    case 7: {
+      Pull pull{"block", random_vector(stream), duration, random_scalar(stream)};
+      if (random_below(stream, 2) == 1) pull.point_O = random_vector(stream);
+      action.what = pull;
+      break;
+    }
+    case 8: {
+      const bool hinge = random_below(stream, 2) == 1;
+      MoveJoint move{"slide", hinge ? JointType::kHinge : JointType::kSlider,
+                     hinge ? geometry::kDegree * stream.uniform(-170.0, 170.0) : stream.uniform(0.0, 1.0), duration,
+                     random_scalar(stream)};
+      if (random_below(stream, 2) == 1) move.handle_C = random_vector(stream);
+      action.what = move;
+      break;
+    }
+    case 9: {
+      Insert insert{"block", geometry::uniform_direction(stream), stream.uniform(0.01, 0.3), duration};
+      insert.force = random_scalar(stream);
+      insert.torque = random_scalar(stream);
+      action.what = insert;
+      break;
+    }
     default:
       action.what = Transport{"block", random_pose_distribution(stream), duration};
   }

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace prescene::belief {
 namespace {
 
@@ -60,6 +62,25 @@ TEST(RobotMotion, ActionsOnWhatIsNotHeldDoNotMoveIt) {
   release.object = "cup";
   release.retreat = {0.0, 0.0, 0.4};
   EXPECT_NEAR(robot_pose_at(scene, std::vector<Action>{{0.0, release}}, 0, 1.0).translation.z(), 1.0, 1e-12);
+}
+
+TEST(RobotMotion, TurnsWithWhatItTiltsAndGoesAlongWithWhatItInserts) {
+  Scene scene = scene_with_hand();
+  scene.robot[0].timeline.resize(1);
+  Tilt tilt;
+  tilt.object = "cup";
+  tilt.axis_W = Vector3d::UnitY();
+  tilt.angle = std::acos(0.0);
+  tilt.duration = 1.0;
+  // The hand is 0.1 m above the cup, about whose origin it turns to its side.
+  const Pose turned = robot_pose_at(scene, std::vector<Action>{{0.5, tilt}}, 0, 2.0);
+  EXPECT_LT((turned.translation - Vector3d(0.1, 0.0, 0.9)).norm(), 1e-12);
+  Insert insert;
+  insert.object = "cup";
+  insert.distance = 0.2;
+  const std::vector<Action> inserted = {{0.5, insert}};
+  EXPECT_NEAR(robot_pose_at(scene, inserted, 0, 0.9).translation.z(), 0.9, 1e-12);  // half of the first four fifths
+  EXPECT_NEAR(robot_pose_at(scene, inserted, 0, 1.4).translation.z(), 0.8, 1e-12);
 }
 
 TEST(RobotMotion, ActionsLastAsLongAsTheyMoveSomething) {

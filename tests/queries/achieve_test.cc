@@ -207,6 +207,27 @@ TEST(Achieve, PushesAnObjectThatIsFree) {
   EXPECT_GT(value_of(told, told.best.values, "distance"), 0.08);
 }
 
+TEST(Achieve, BumpsAnObjectAsHardAsItMust) {
+  AchieveQuery query;
+  query.wanted = belief::Outcome{"goes", "cup", {belief::Condition{belief::MovedMoreThan{0.05}}}};
+  query.action = "bump";
+  query.object = "cup";
+  query.free = {{"direction", {}, {}}, {"impulse", 0.01, 1.0}, {"height", {}, {}}};
+  core::ThreadPool pool(2);
+  const auto law = [](const belief::WorldState& start, const simulation::RunRequest& request, core::RandomStream) {
+    const auto& bump = std::get<belief::Bump>(request.actions.back().what);
+    belief::WorldState end = start;
+    end.objects[1].X_WO.translation += 0.1 * belief::mean(bump.impulse);
+    return end;
+  };
+  const Answer answer = queries::answer(held_scene(), 1, {"", query}, tests::context_with(law, pool));
+  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
+  const auto& told = std::get<AchieveAnswer>(answer.what);
+  ASSERT_TRUE(told.found);
+  EXPECT_GT(value_of(told, told.best.values, "impulse"), 0.49);
+  EXPECT_EQ(belief::kind_of(*told.best.action), "bump");
+}
+
 TEST(Achieve, RefusesUnknownNamesWithTheNearest) {
   AchieveQuery query = question();
   query.outcome = "on_tabel";

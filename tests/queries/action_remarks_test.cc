@@ -43,6 +43,14 @@ TEST(ActionRemarks, WhatIsGraspedIsHeldFromThenOn) {
   EXPECT_THAT(remarks_with({pour, grasp}, false), Contains(HasSubstr("'pour carton' at 0.2 s begins")));
 }
 
+TEST(ActionRemarks, ABlowIsTakenByWhatHoldsTheObject) {
+  const belief::Action bump{0.8, belief::Bump{.object = "carton"}};
+  EXPECT_THAT(remarks_with({bump}, false), Each(Not(HasSubstr("bump"))));
+  EXPECT_THAT(remarks_with({bump}, true), Contains(HasSubstr("it takes the blow, which changes nothing")));
+  const belief::Action grip{0.5, belief::Grasp{"carton", "hand", belief::Grip{}}};
+  EXPECT_THAT(remarks_with({grip, bump}, true), Each(Not(HasSubstr("bump"))));
+}
+
 TEST(ActionRemarks, WhatComesAfterTheEndIsNotDone) {
   const belief::Action push{2.5, belief::Push{}};
   EXPECT_THAT(remarks_with({release(1.0), push}, true),

@@ -119,6 +119,11 @@ TEST(Backends, LockstepRunsWhatItCanAndBulletTheRest) {
   EXPECT_TRUE(same(runs(**automatic, *one, kPushes), runs(**bullet, *one, kPushes)));
   EXPECT_EQ(either.stepper_counts().bullet_instead, 1u);
   EXPECT_THAT(either.stepper_counts().last_reason, HasSubstr("17 push actions"));
+  belief::Pull pull;
+  pull.object = "box";
+  pull.by = {0.1, 0.0, 0.0};
+  EXPECT_TRUE(same(runs(**automatic, *one, {{0.05, pull}}), runs(**bullet, *one, {{0.05, pull}})));
+  EXPECT_EQ(either.stepper_counts().last_reason, "the action pull is not simulated in lockstep");
   // Nobody is instead of anybody where one of them was asked for.
   EXPECT_EQ(bullets.stepper_counts().bullet_instead, 0u);
   EXPECT_EQ(lanes.stepper_counts().bullet_instead, 0u);

@@ -146,6 +146,8 @@ TEST(IdleControls, AreThoseOfWhatIsNotThereOrNotHeld) {
   EXPECT_EQ(idle(release).last, "the action 'release' of 'box' changes nothing: nothing holds it");
   EXPECT_EQ(idle(pour).last, "the action 'pour' of 'box' changes nothing: nothing holds it");
   EXPECT_EQ(idle(grasp + "," + release + "," + release).count, 1u);
+  EXPECT_EQ(idle(R"({"time": 0, "bump": {"object": "box", "impulse": [1, 0, 0]}})").last,
+            "the action 'bump' of 'box' changes nothing: the tracker follows what is seen of it");
   EXPECT_EQ(idle(R"({"time": 0, "release": {"object": "cup\n"}})").last,
             R"(the action 'release' of 'cup\x0a' changes nothing: the scene has no such object)");
   EXPECT_EQ(idle(R"({"time": 0, "grasp": {"object": "box", "hand": "foot"}})").last,

@@ -144,6 +144,24 @@ TEST(JointsFile, WhatCanNotBeIsRefusedWithItsLine) {
       AllOf(HasSubstr("s.yaml:18: outcomes.o"), HasSubstr("never gets there")));
 }
 
+TEST(JointsFile, AJointIsMovedToAPositionOfItsOwnUnitWithinItsLimits) {
+  const auto moved = [](const std::string& keys) {
+    return read(text_of(kSlide + std::string("}\n"), "actions:\n  - {time: 0, move_joint: {" + keys + "}}\n"));
+  };
+  EXPECT_EQ(moved("joint: slide, to: 0.2, force: 10, handle: [0.1, 0, 0]").errors, "");
+  EXPECT_THAT(moved("joint: slid, to: 0.2").errors, HasSubstr("did you mean 'slide'"));
+  EXPECT_THAT(moved("joint: slide").errors, HasSubstr("give the position of the slider in m"));
+  EXPECT_THAT(moved("joint: slide, to_deg: 20").errors, HasSubstr("to_deg"));
+  EXPECT_THAT(moved("joint: slide, to: 0.4").errors, HasSubstr("give a position within its limits"));
+  const auto turned = [](const std::string& keys) {
+    return read(text_of(
+        "    {type: hinge, parent: cabinet, child: drawer, axis: z, anchor: [0, 0, 0], min_deg: 0, max_deg: 90}\n",
+        "actions:\n  - {time: 0, move_joint: {joint: slide, " + keys + "}}\n"));
+  };
+  EXPECT_THAT(turned("to: 0.2").errors, HasSubstr("give the position of the hinge in degrees"));
+  EXPECT_THAT(turned("to_deg: 120").errors, HasSubstr("within its limits"));
+}
+
 TEST(JointsFile, WarnsOfStartsThatSpreadAcrossTheJoint) {
   const auto spread = [](const char* position) {
     std::string text = text_of(kSlide + std::string("}\n"));

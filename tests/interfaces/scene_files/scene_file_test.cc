@@ -54,7 +54,7 @@ TEST(SceneFile, OfThePageHasAllThatThePageSays) {
   EXPECT_EQ(scene.robot.size(), 2U);
   EXPECT_EQ(scene.objects.size(), 8U);
   EXPECT_EQ(scene.joints.size(), 2U);
-  EXPECT_EQ(scene.actions.size(), 6U);
+  EXPECT_EQ(scene.actions.size(), 12U);
   EXPECT_EQ(scene.exclusive_outcomes[1].outcomes.size(), 6U);
   EXPECT_EQ(scene.objects[0].held_by, "gripper");
   EXPECT_EQ(core::ok_status(), belief::validate(scene));
@@ -306,6 +306,14 @@ TEST(SceneFile, ExplainsWhatDoesNotGoTogether) {
   EXPECT_THAT(error_of(small("", "    sphere: 1\n")), HasSubstr("exclude each other"));
   EXPECT_THAT(error_of(small("actions:\n  - {time: 1, release: {object: block}}\n")),
               HasSubstr("'block' is not held at that time"));
+  EXPECT_THAT(error_of(small("actions:\n  - {time: 1, tilt: {object: block, angle_deg: 5}}\n")),
+              HasSubstr("'block' is not held at that time"));
+  EXPECT_THAT(error_of(small("actions:\n  - {time: 1, bump: {object: block}}\n")),
+              HasSubstr("give the impulse [x, y, z] in the world, N s"));
+  EXPECT_THAT(error_of(small("actions:\n  - {time: 1, pull: {object: block, by: [1, 0, 0], force: -1}}\n")),
+              HasSubstr("give a force in N"));
+  EXPECT_THAT(error_of(small("actions:\n  - {time: 1, pull: {object: block, by: [0, 0, 0]}}\n")),
+              HasSubstr("it pulls nowhere"));
   EXPECT_THAT(error_of(small("outcomes:\n  a: {inside: table}\n")),
               HasSubstr("'table' has no hollow: make it an open_bin"));
   EXPECT_THAT(error_of(small("outcomes:\n  a: {object: block}\n")), HasSubstr("the outcome has no condition"));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Actions, contacts and ends of runs, as of any stepper.
 #include "lockstep_scenes.h"
-#include "tests/support/stepper_contract.h"
+#include "tests/support/grip_contract.h"
 
 namespace prescene::tests {
 namespace {

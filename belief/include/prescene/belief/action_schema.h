@@ -16,7 +16,7 @@ namespace prescene::belief {
 /// A number that an action takes.
 struct ActionParameter {
   std::string name;  ///< With "_deg" at its end where it is in degrees; it may be left out where it is named.
-  std::string unit;  ///< "m", "deg", "s" or "m/s".
+  std::string unit;  ///< "m", "deg", "s", "m/s" or "N s".
   double least = 0.0, most = 0.0;  ///< What makes sense at all.
   /// Where it is not given; nothing: the scene gives it.
   std::optional<double> value;
@@ -34,7 +34,7 @@ struct ActionSchema {
   std::vector<ActionParameter> parameters;
 };
 
-/// "place", "push" and "release".
+/// "place", "push", "bump" and "release".
 const std::vector<ActionSchema>& action_schemas();
 /// kNotFound with the nearest name.
 core::Result<const ActionSchema*> find_action_schema(const std::string& name);

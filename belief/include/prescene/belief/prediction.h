@@ -122,7 +122,7 @@ struct ContactForecast {
 /// Why a start is followed as one object no further.
 enum class FlightEnd {
   kMayTouch,     ///< Something may touch something.
-  kPush,         ///< A push begins within a look (1/60 s).
+  kPush,         ///< A push begins within a look (1/60 s), or what else drives objects but a rigid hold.
   kNotFollowed,  ///< Flights that last longer than this (10 s) are not followed.
   kRunEnds,      ///< Nothing does within the run, up to its last look.
 };

@@ -10,7 +10,8 @@ namespace prescene::belief {
 
 /// X_WG of robot body number `body` at `time` (s since the scene's start): its timeline; from a release of what it
 /// holds, shifted along the retreat; during and after a place or transport of what it holds, carried with that object
-/// to the action's mean pose (in a straight line, at constant speed) and staying there. `actions` ascend in time.
+/// to the action's mean pose (in a straight line, at constant speed) and staying there; turned with it by a pour or
+/// tilt, and moved with it by an insertion, as if nothing were in the way. `actions` ascend in time.
 Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, int body, double time);
 
 /// For how long (s) an action moves something: a release, while the hand retreats. 0 for what is done at once.
@@ -19,5 +20,9 @@ double duration_of(const Action& action);
 /// Share of a motion from `begin` on, at constant speed for `duration` (s), that is done at `time`; 0 before it and 1
 /// after it.
 double share_done(double begin, double duration, double time);
+/// The same of a MoveJoint or Insert of that duration, which moves in the first part of it (kMovingShare).
+double moved_share(double begin, double duration, double time);
+/// Turned by an angle (rad) about an axis in W through a point of the object.
+Pose turned_about(const Pose& X_WO, const Vector3d& pivot_O, const Vector3d& axis_W, double angle);
 
 }  // namespace prescene::belief

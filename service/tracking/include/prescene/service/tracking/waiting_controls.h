@@ -31,7 +31,7 @@ struct ParsedControl {
 /// Of {"stamp_ns": n, "actions": [...]} or {"restart": true}; kInvalidInput naming the key that makes no sense.
 core::Result<ParsedControl> parse_control(const std::string& json);
 
-/// How long after its start an action lets go of its object, ns: a placement at its end, others have 0.
+/// How long after its start an action lets go of its object, ns: a placement or insertion at its end, others have 0.
 core::TimeNs placement_time(const belief::Action& action);
 
 /// Actions that change nothing in what is tracked.
@@ -40,7 +40,8 @@ struct IdleControls {
   std::string last;  ///< "the action 'release' of 'cup' changes nothing: nothing holds it"; "" = there is none.
 };
 /// Those of a control that begins in `scene`, in their order: an object or a hand that is not in the scene, or
-/// something to be done with an object (release, place, pour, transport) that nothing holds then.
+/// something to be done with an object (release, place, pour, transport, tilt, insert) that nothing holds then; and
+/// forces (bump, pull, move_joint), of which the tracker follows what is seen.
 IdleControls idle_controls(const belief::Scene& scene, const belief::Control& control);
 
 /// Not thread-safe. Times are stamps of frames, ns.

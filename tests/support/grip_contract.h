@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every stepper does alike with tilts, blows, and grips that may slip: laws in closed form. Tests of a stepper
+// include this and instantiate StepperContract.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "tests/support/stepper_contract.h"
+
+namespace prescene::tests {
+
+TEST_P(StepperContract, ATiltTurnsTheHeldObjectAboutItsPivot) {
+  Scene scene = held_scene();
+  scene.robot[0].timeline.resize(1);
+  belief::Tilt tilt;
+  tilt.object = "object";
+  tilt.axis_W = Vector3d::UnitY();
+  tilt.angle = 0.5 * kPi;
+  tilt.pivot_O = {0.05, 0.0, -0.05};
+  const belief::ObjectState end = run_actions(scene, {{0.1, tilt}}, 1.5).final().objects[0];
+  EXPECT_EQ(end.mode, MotionMode::kHeld);
+  // The lower edge stays, and what was above it is beside it.
+  EXPECT_LT((end.X_WO * tilt.pivot_O - Vector3d(0.05, 0.0, 0.45)).norm(), fine(1e-9));
+  EXPECT_LT((end.X_WO.translation - Vector3d(0.10, 0.0, 0.50)).norm(), fine(1e-9));
+}
+
+TEST_P(StepperContract, ABumpGivesItsMomentumAndTheMomentOfIt) {
+  Scene scene = floor_scene(primitive_model("cube", BoxShape{{0.1, 0.1, 0.1}}, 2.0));
+  scene.gravity_W.setZero();
+  scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 0.5})};
+  belief::Bump bump;
+  bump.object = "object";
+  bump.impulse = belief::Vector3Distribution::fixed({0.4, 0.0, 0.0});
+  bump.point_O = Vector3d(-0.05, 0.02, 0.0);
+  const belief::Trajectory run = run_actions(scene, {{0.2, bump}}, 0.7);
+  const belief::ObjectState end = run.final().objects[0];
+  EXPECT_LT((end.V_WO.linear - Vector3d(0.2, 0.0, 0.0)).norm(), fine(1e-9));
+  // r x J = (0, 0, -0.02 * 0.4) over m a^2 / 6.
+  EXPECT_LT((end.V_WO.angular - Vector3d(0.0, 0.0, -0.008 / (2.0 * 0.01 / 6.0))).norm(), 10.0 * fine(1e-9));
+  EXPECT_NEAR(end.X_WO.translation.x(), 0.5 * 0.2, fine(1e-9) + 0.2 * 1.0 / 240.0);
+}
+
+TEST_P(StepperContract, ABumpWakesWhatRestsAndLeavesAloneWhatAHandHolds) {
+  Scene scene = held_scene();
+  scene.robot[0].timeline.resize(1);
+  add_object(scene, primitive_model("rests", BoxShape{{0.1, 0.1, 0.1}}), "rests");
+  scene.objects[1].pose = belief::FixedPose{Pose::from_translation({1.0, 0.0, 0.05})};
+  std::vector<belief::Action> actions;
+  for (const char* object : {"object", "rests"}) {
+    belief::Bump bump;
+    bump.object = object;
+    bump.impulse = belief::Vector3Distribution::fixed({0.6, 0.0, 0.0});
+    actions.push_back({1.0, bump});
+  }
+  const belief::WorldState end = run_actions(scene, actions, 3.0).final();
+  EXPECT_LT((end.objects[0].X_WO.translation - Vector3d(0.0, 0.0, 0.5)).norm(), fine(1e-9));
+  // Slides v^2 / 2 mu g.
+  EXPECT_NEAR(end.objects[1].X_WO.translation.x(), 1.0 + 0.36 / (2.0 * 0.5 * kG), 0.004);
+}
+
+/// The box of held_scene(), 1 kg, that a grip of two fingers holds from `time` on by at most `limit` (N).
+inline belief::Action grip_of(double time, double limit, double pad_length = 0.03) {
+  belief::Grasp grasp{"object", "hand", belief::Grip{}};
+  grasp.grip->force = belief::FixedScalar{limit};
+  grasp.grip->friction = belief::FixedScalar{0.5};
+  grasp.grip->pad_length = pad_length;
+  return {time, grasp};
+}
+
+TEST_P(StepperContract, AGripHoldsWhatItsFrictionCarriesAndWhatIsHeavierSlidesOutAndFalls) {
+  Scene scene = held_scene();
+  scene.robot[0].timeline.resize(1);
+  const Vector3d start(0.0, 0.0, 0.5);
+  const belief::ObjectState held = run_actions(scene, {grip_of(0.0, 1.001 * kG)}, 1.0).final().objects[0];
+  EXPECT_EQ(held.mode, MotionMode::kHeld);
+  EXPECT_LT((held.X_WO.translation - start).norm(), fine(1e-9));
+  // It slides with what the friction leaves of gravity.
+  const double excess = 0.2;
+  const belief::ObjectState slid = run_actions(scene, {grip_of(0.0, kG - excess)}, 0.5).final().objects[0];
+  EXPECT_EQ(slid.mode, MotionMode::kMoving);
+  EXPECT_NEAR(slid.X_WO.translation.z(), 0.5 - 0.5 * excess * 0.25, 2e-4);
+  EXPECT_NEAR(slid.V_WO.linear.z(), -excess * 0.5, 2e-3);
+  // Out of the pads it falls freely: v^2 = 2 (excess * pad + g * rest).
+  const belief::Trajectory fallen = run_actions(scene, {grip_of(0.0, 0.5 * kG, 0.02)}, 3.0);
+  EXPECT_EQ(fallen.end, TrajectoryEnd::kAtRest);
+  EXPECT_NEAR(fallen.final().objects[0].X_WO.translation.z(), 0.05, 1e-3);
+  double first = 0.0;
+  for (const belief::ContactInterval& contact : fallen.contacts)
+    if (contact.second == 1 && first == 0.0) first = contact.begin;
+  const double leaves = std::sqrt(2.0 * 0.02 / (0.5 * kG)), speed = 0.5 * kG * leaves;
+  const double lands = leaves + (std::sqrt(speed * speed + 2.0 * kG * (0.45 - 0.02)) - speed) / kG;
+  EXPECT_NEAR(first, lands, 0.01);
+}
+
+TEST_P(StepperContract, AGripSlipsOnceTheHandAcceleratesTooMuch) {
+  Scene scene = held_scene();
+  const double acceleration = 3.0, step = simulation::MechanicsOptions{}.step;
+  belief::KinematicBody& hand = scene.robot[0];
+  const double height = hand.timeline[0].X_WG.translation.z();
+  hand.timeline.clear();
+  for (int i = 0; i <= 60; ++i) {
+    const double t = i * step;
+    hand.timeline.push_back({t, Pose::from_translation({0.0, 0.0, height + 0.5 * acceleration * t * t})});
+  }
+  for (const double share : {0.99, 1.01}) {
+    const double limit = share * (kG + acceleration);
+    const belief::ObjectState end = run_actions(scene, {grip_of(0.0, limit)}, 0.25).final().objects[0];
+    const double lag = 0.5 + 0.5 * acceleration * 0.0625 - end.X_WO.translation.z();
+    if (share > 1.0) {
+      EXPECT_EQ(end.mode, MotionMode::kHeld);
+      EXPECT_NEAR(lag, 0.0, fine(1e-6));
+    } else {
+      EXPECT_EQ(end.mode, MotionMode::kMoving);
+      // The hand's velocity is that of a step's chord, which is half a step behind.
+      EXPECT_NEAR(lag, 0.5 * 0.01 * (kG + acceleration) * 0.0625, 0.5 * acceleration * step * 0.25 + 3e-4);
+    }
+  }
+}
+
+TEST_P(StepperContract, WhatSlidesInAGripThatStopsSticksAgainOrLeavesIt) {
+  Scene scene = held_scene();
+  scene.gravity_W.setZero();
+  scene.robot[0].timeline[1] = {1.0, Pose::from_translation({0.5, 0.0, 0.558})};
+  // The hand of 0.5 m/s stops at 1 s: v^2 m / 2 L is the way on.
+  const belief::ObjectState sticks = run_actions(scene, {grip_of(0.5, 10.0)}, 1.5).final().objects[0];
+  EXPECT_EQ(sticks.mode, MotionMode::kHeld);
+  EXPECT_NEAR(sticks.X_WO.translation.x(), 0.5 + 0.0125, 1.5e-3);
+  const belief::ObjectState leaves = run_actions(scene, {grip_of(0.5, 2.0)}, 1.5).final().objects[0];
+  EXPECT_EQ(leaves.mode, MotionMode::kMoving);
+  EXPECT_NEAR(leaves.V_WO.linear.x(), std::sqrt(0.25 - 2.0 * 2.0 * 0.03), 0.01);
+}
+
+TEST_P(StepperContract, ABlowLoosensAGrip) {
+  Scene scene = held_scene();
+  scene.gravity_W.setZero();
+  scene.robot[0].timeline.resize(1);
+  belief::Bump bump;
+  bump.object = "object";
+  bump.impulse = belief::Vector3Distribution::fixed({0.0, 0.0, -0.4});
+  const belief::ObjectState end = run_actions(scene, {grip_of(0.0, 10.0), {0.2, bump}}, 1.0).final().objects[0];
+  EXPECT_EQ(end.mode, MotionMode::kHeld);
+  EXPECT_NEAR(end.X_WO.translation.z(), 0.5 - 0.16 / 20.0, 1e-3);
+}
+
+TEST_P(StepperContract, AsManyGripsSlipAsTheirFrictionSays) {
+  Scene scene = held_scene();
+  scene.robot[0].timeline.resize(1);
+  belief::Grasp grasp{"object", "hand", belief::Grip{}};
+  grasp.grip->force = belief::FixedScalar{10.0};
+  grasp.grip->friction = belief::NormalScalar{0.5, 0.1, 0.0};
+  simulation::RunRequest request;
+  request.actions = {{0.0, grasp}};
+  request.stop.duration = 0.03;
+  constexpr int kInstances = 2000;
+  const std::vector<WorldState> starts(kInstances, start_of(scene));
+  std::vector<belief::Trajectory> runs(starts.size());
+  core::ThreadPool pool(1);
+  simulator_of(scene)->run(starts, request, core::RandomStream(7, core::Purpose::kTest), 0, pool, runs);
+  int slipped = 0;
+  for (const belief::Trajectory& run : runs) slipped += run.final().objects[0].mode != MotionMode::kHeld ? 1 : 0;
+  // 2 mu F < m g for mu < 0.4905; four standard errors.
+  const double expected = 0.5 * std::erfc((0.5 - 0.05 * kG) / 0.1 / std::sqrt(2.0));
+  EXPECT_NEAR(slipped / static_cast<double>(kInstances), expected,
+              4.0 * std::sqrt(expected * (1.0 - expected) / kInstances));
+}
+
+TEST_P(StepperContract, AGripWithoutAFrictionOfItsOwnHasThatOfTheSurfaces) {
+  Scene scene = held_scene();  // of the box: 0.5
+  scene.robot[0].timeline.resize(1);
+  scene.robot[0].contact.friction = belief::FixedScalar{0.8};
+  for (const double force : {12.0, 12.5}) {  // m g / 2 / 0.4 = 12.26
+    belief::Grasp grasp{"object", "hand", belief::Grip{}};
+    grasp.grip->force = belief::FixedScalar{force};
+    const belief::ObjectState end = run_actions(scene, {{0.0, grasp}}, 0.1).final().objects[0];
+    EXPECT_EQ(end.mode == MotionMode::kHeld, force > 12.26) << force;
+  }
+}
+
+TEST_P(StepperContract, ASlidThingIsPlacedWhereItSlidToAndALostOneIsNot) {
+  Scene scene = held_scene();
+  scene.robot[0].timeline.resize(1);
+  belief::Bump bump;
+  bump.object = "object";
+  bump.impulse = belief::Vector3Distribution::fixed({0.0, 0.0, -0.4});
+  belief::Transport transport;
+  transport.object = "object";
+  transport.X_WO = belief::FixedPose{Pose::from_translation({0.0, 0.2, 0.5})};
+  scene.gravity_W.setZero();
+  const belief::Trajectory slid = run_actions(scene, {grip_of(0.0, 10.0), {0.2, bump}, {0.5, transport}}, 2.0);
+  const Vector3d end = slid.final().objects[0].X_WO.translation;
+  EXPECT_NEAR(end.z(), 0.5 - 0.008, 1e-3);
+  EXPECT_NEAR(end.y(), 0.2, 3e-3);
+  bump.impulse = belief::Vector3Distribution::fixed({0.0, 0.0, -2.0});
+  const belief::Trajectory lost = run_actions(scene, {grip_of(0.0, 10.0), {0.2, bump}, {0.5, transport}}, 0.8);
+  EXPECT_LT(lost.final().objects[0].X_WO.translation.y(), 1e-3);
+}
+
+}  // namespace prescene::tests
