@@ -27,7 +27,8 @@ struct SimulatedRecordingOptions {
   std::string world_frame = "world";
   rendering::SimulatedCameraOptions camera;
   rendering::SensorModelOptions sensor;  ///< The scene's depth_noise takes precedence.
-  /// The camera's lens, which bends the images and is published in the camera info: of plumb_bob's or equidistant's form.
+  /// The camera's lens, which bends the images and is published in the camera info: of plumb_bob's or equidistant's
+  /// form.
   geometry::LensDistortion lens;
   /// What happens to objects without being announced. Which outcomes occurred is not recorded then.
   std::vector<UnannouncedChange> changes;
