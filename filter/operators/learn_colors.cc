@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "prescene/filter/operators/track_state.h"
+#include "prescene/filter/proposals/learned_colors.h"
 #include "prescene/filter/proposals/render_scene.h"
 
 namespace prescene::filter {

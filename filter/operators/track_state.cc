@@ -167,13 +167,6 @@ int seeing_cameras(const TrackedBy& by, const ObjectBelief& object) {
   return std::max(1, static_cast<int>(fresh_views(by, object).size()));
 }
 
-belief::LearnedColors& colors_by(int camera, ObjectBelief& object) {
-  const auto number = static_cast<std::size_t>(camera);
-  if (camera == 0) return object.colors;
-  if (object.views.size() <= number) object.views.resize(number + 1);
-  return object.views[number].colors;
-}
-
 void mark_unseen(const TrackedBy& by, const TrackStateOptions& options, ObjectBelief& object) {
   if (belief::CameraView* view = view_of(by, object)) show(Verdict{}, *view);
   if (fresh_views(by, object).empty()) nothing_sees(by.stamp_ns, options, object);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "prescene/core/check.h"
@@ -53,14 +54,25 @@ bool learns(const belief::Belief& belief, const belief::ObjectBelief& object, co
   return options.learn || belief.scene->models[static_cast<std::size_t>(object.model)].learn_colors;
 }
 
+const LearnedColors* colors_by(int camera, const belief::ObjectBelief& object) {
+  if (camera == 0) return &object.colors;
+  const auto number = static_cast<std::size_t>(camera);
+  return number < object.views.size() ? &object.views[number].colors : nullptr;
+}
+
+LearnedColors& colors_by(int camera, belief::ObjectBelief& object) {
+  const auto number = static_cast<std::size_t>(camera);
+  if (camera != 0 && object.views.size() <= number) object.views.resize(number + 1);
+  return const_cast<LearnedColors&>(*colors_by(camera, std::as_const(object)));
+}
+
 std::map<std::string, rendering::ColorModel> learned_models(const belief::Belief& belief,
                                                             const ColorLearningOptions& options, int camera) {
   std::map<std::string, rendering::ColorModel> models;
-  const auto number = static_cast<std::size_t>(camera);
   for (const belief::ObjectBelief& object : belief.objects) {
-    if (!learns(belief, object, options) || (camera != 0 && object.views.size() <= number)) continue;
-    const LearnedColors& colors = camera == 0 ? object.colors : object.views[number].colors;
-    if (colors.shares && colors.frames >= options.frames) models.emplace(object.name, model_of(colors, options.model));
+    const LearnedColors* colors = learns(belief, object, options) ? colors_by(camera, object) : nullptr;
+    if (colors != nullptr && colors->shares && colors->frames >= options.frames)
+      models.emplace(object.name, model_of(*colors, options.model));
   }
   return models;
 }

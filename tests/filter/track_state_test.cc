@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "prescene/filter/proposals/learned_colors.h"
+
 namespace prescene::filter_tests {
 namespace {
 
@@ -186,6 +188,9 @@ TEST_F(TwoCameras, LearnTheirOwnColours) {
   filter::colors_by(1, object_).frames = 7;
   EXPECT_EQ(object_.colors.frames, 3);
   EXPECT_EQ(object_.views.at(1).colors.frames, 7);
+  const belief::ObjectBelief& known = object_;
+  EXPECT_EQ(filter::colors_by(1, known), &object_.views.at(1).colors);
+  EXPECT_EQ(filter::colors_by(2, known), nullptr);
 }
 
 }  // namespace

@@ -56,8 +56,6 @@ bool is_shown_by(const belief::ObjectBelief& object, int camera);
 bool was_unseen_by(const belief::ObjectBelief& object, int camera);
 /// How many cameras' newest frames show it, at least 1.
 int seeing_cameras(const TrackedBy& by, const belief::ObjectBelief& object);
-/// What this camera's frames showed of the object's colours.
-belief::LearnedColors& colors_by(int camera, belief::ObjectBelief& object);
 
 /// Sets state, evidence, visible share, counters and existence of `object` from a frame's report.
 void update_track(const WeightReport& report, const TrackedBy& by, const TrackStateOptions& options,

@@ -43,6 +43,11 @@ rendering::ColorModel model_of(const belief::LearnedColors& colors, const render
 /// Whether the object's colours are to be learned.
 bool learns(const belief::Belief& belief, const belief::ObjectBelief& object, const ColorLearningOptions& options);
 
+/// What this camera's frames showed of the object's colours; there is room for it from then on.
+belief::LearnedColors& colors_by(int camera, belief::ObjectBelief& object);
+/// The same, or null where they showed none yet.
+const belief::LearnedColors* colors_by(int camera, const belief::ObjectBelief& object);
+
 /// By object name, of those that learn and have learned from enough frames of this camera: two cameras show one colour
 /// as two.
 std::map<std::string, rendering::ColorModel> learned_models(const belief::Belief& belief,
