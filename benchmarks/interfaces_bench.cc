@@ -2,10 +2,10 @@
 // What the bus and recordings cost: from writing a frame to the belief that is published of it, a recorder's share of a
 // core and its loss when it is killed, and how fast a recording is replayed.
 //
-//   bench_interfaces [--quick] [--seconds=N] [--domain=N] [--benchmark_out=PATH]
+//   bench_interfaces [--quick] [--only=PART] [--seconds=N] [--domain=N] [--benchmark_out=PATH]
 //
-// --seconds: of each measurement at 30 Hz (30; quick 8). The service, the recorder and the reader by Cyclone's own
-// interface are processes of their own; the robot that writes is this one.
+// --only: bus, recorder or replay. --seconds: of each measurement at 30 Hz (30; quick 8). The service, the recorder and
+// the reader by Cyclone's own interface are processes of their own; the robot that writes is this one.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -60,7 +60,10 @@ camera:
 struct Options {
   double seconds = 30.0;
   int domain = 97;
+  std::string only;  // "" = all
   std::string out;
+
+  bool measures(const char* part) const { return only.empty() || only == part; }
 };
 
 struct Frames {
@@ -317,23 +320,29 @@ int run(const Options& arguments) {
     if (!status.ok()) std::fprintf(stderr, "%s\n", status.message().c_str());
   });
   simulator.wait();
-  Child service = Child::start([&](const core::Cancellation& c) { run_service(kScene, arguments.domain, steps, c); });
-  Child bare = Child::start([&](const core::Cancellation& c) { run_bare_reader(arguments.domain, delays, c); });
-  Child recorder = Child::start([&](const core::Cancellation& c) { run_recorder(arguments.domain + 1, recorded, c); });
+  std::optional<Child> service, bare, recorder;
+  if (arguments.measures("bus")) {
+    service = Child::start([&](const core::Cancellation& c) { run_service(kScene, arguments.domain, steps, c); });
+    bare = Child::start([&](const core::Cancellation& c) { run_bare_reader(arguments.domain, delays, c); });
+  }
+  if (arguments.measures("recorder"))
+    recorder = Child::start([&](const core::Cancellation& c) { run_recorder(arguments.domain + 1, recorded, c); });
   Report report("interfaces", best_simd_target());
   const auto measure = [&]() -> core::Status {
     PRESCENE_TRY(const Frames frames, read_frames(played));
-    PRESCENE_RETURN_IF_ERROR(measure_bus(frames, arguments, service, bare, steps, delays, &report));
-    PRESCENE_RETURN_IF_ERROR(measure_recorder(frames, arguments, recorder, recorded, &report));
+    if (service) PRESCENE_RETURN_IF_ERROR(measure_bus(frames, arguments, *service, *bare, steps, delays, &report));
+    if (recorder) PRESCENE_RETURN_IF_ERROR(measure_recorder(frames, arguments, *recorder, recorded, &report));
+    if (!arguments.measures("replay")) return core::ok_status();
     return measure_replay(played, arguments.seconds < 20.0 ? 3 : 9, &report);
   };
   const core::Status status = measure();
-  for (Child* child : {&service, &bare, &recorder}) child->stop(true);
+  for (std::optional<Child>* child : {&service, &bare, &recorder})
+    if (*child) (*child)->stop(true);
   if (!status.ok()) {
     std::fprintf(stderr, "%s\n", core::to_string(status).c_str());
     return 1;
   }
-  add_unmeasured(&report);
+  if (arguments.only.empty()) add_unmeasured(&report);
   std::fputs(report.text().c_str(), stdout);
   return report.finish(arguments.out);
 }
@@ -347,6 +356,7 @@ int main(int count, char** words) {
   arguments.flag("quick", [&] { options.seconds = 8.0; });
   arguments.number("seconds", 0.1, 1e6, &options.seconds);
   arguments.number("domain", 1, 230, &options.domain);
+  arguments.one_of("only", {"bus", "recorder", "replay"}, &options.only);
   arguments.text("benchmark_out", "PATH", &options.out);
   return arguments.parse(count, words) ? prescene::benchmarks::run(options) : 2;
 }
