@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "benchmarks/plain_runs.h"
 #include "benchmarks/statistics.h"
 #include "prescene/core/check.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
@@ -114,24 +115,7 @@ std::vector<Forecast> forecasts_of(const std::shared_ptr<const belief::Scene>& s
   PRESCENE_CHECK_MSG(answer.error.ok(), answer.error.message());
   const auto& predicted = std::get<belief::PredictAnswer>(answer.what);
 
-  service::BackendSettings settings;
-  settings.stepper = service::Stepper::kBullet;
-  service::Backends bullet(pool, settings);
-  belief::Scene fine = *scene;
-  fine.step = kFineStep;
-  const auto simulator = bullet.make_simulator(fine);
-  PRESCENE_CHECK_MSG(simulator.ok(), simulator.status().message());
-  core::RandomStream stream(seed, core::Purpose::kTest);
-  std::vector<double> uniforms(static_cast<std::size_t>(belief::start_dimensions(*scene)));
-  std::vector<belief::WorldState> starts;
-  for (int i = 0; i < kTimes; ++i) {
-    for (double& u : uniforms) u = stream.uniform();
-    starts.push_back(belief::draw_start(*scene, uniforms));
-  }
-  simulation::RunRequest request;
-  request.stop.duration = scene->duration;
-  std::vector<belief::Trajectory> runs(starts.size());
-  (*simulator)->run(starts, request, core::RandomStream(seed, core::Purpose::kEvaluation), 0, pool, runs);
+  const std::vector<belief::Trajectory> runs = plain_runs(*scene, kTimes, kFineStep, seed, pool);
 
   std::vector<Forecast> forecasts;
   for (const simulation::Variable& variable :
