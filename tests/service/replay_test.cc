@@ -59,7 +59,8 @@ TEST(ReadAhead, GivesWhatTheReaderGives) {
   ASSERT_TRUE(direct.ok() && ahead_of.ok());
   ReadAhead ahead(**ahead_of, decode_nothing);
   for (int i = 0; i < 200; ++i) {
-    const auto expected = (*direct)->next(), entry = ahead.next();
+    const auto expected = (*direct)->next();
+    const auto entry = ahead.next();
     ASSERT_TRUE(expected.ok() && *expected && entry.ok() && *entry) << i;
     ASSERT_EQ((*entry)->recorded.index, (*expected)->index);
     ASSERT_EQ((*entry)->recorded.message.cdr, (*expected)->message.cdr) << i;
@@ -85,7 +86,8 @@ TEST(ReadAhead, GivesTheErrorAfterWhatCameBeforeIt) {
   ASSERT_TRUE(direct.ok() && ahead_of.ok());
   ReadAhead ahead(**ahead_of, decode_nothing);
   for (;;) {
-    const auto expected = (*direct)->next(), entry = ahead.next();
+    const auto expected = (*direct)->next();
+    const auto entry = ahead.next();
     ASSERT_EQ(entry.status(), expected.status());
     if (!expected) break;
     ASSERT_TRUE(*expected && *entry) << "the damage was not noticed";
