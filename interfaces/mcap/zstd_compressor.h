@@ -2,9 +2,6 @@
 // Compresses a chunk of a recording in one frame of zstd [Collet & Kucherawy 2021], and what does not shrink not at
 // all: the noise of a colour image, or a JPEG, would take as long as everything else and save nothing. Such stretches
 // are the frame's raw blocks, so that every reader of zstd reads it.
-//
-//   ZstdCompressor compressor;                                  // keeps its memory
-//   if (const auto frame = compressor.compress(bytes)) ... *frame
 #pragma once
 
 #include <zstd.h>
