@@ -191,19 +191,27 @@ class ActionReader {
     point(fields, "point", pull.point_O);
     return pull;
   }
+  void check_reach(const belief::Joint& joint, double to, const LocatedValue& at) {
+    constexpr double kRounding = 1e-9;
+    if (to < joint.low - kRounding || to > joint.high + kRounding)
+      problems_.add(at.place, at.path, interfaces::quote(joint.name) + " does not get there",
+                    "give a position within the limits of the joint");
+  }
   belief::MoveJoint read_move_joint(Binder& fields) {
     belief::MoveJoint move;
     std::vector<std::string> names;
     for (const belief::Joint& joint : context_.scene.joints) names.push_back(joint.name);
     if (const LocatedValue* at = fields.require("joint", "name one of the scene's joints"))
       move.joint = context_.read_name(*at, names, "a joint");
-    if (const auto index = belief::find_joint(context_.scene, move.joint))
-      move.type = context_.scene.joints[static_cast<std::size_t>(*index)].type;
+    const auto index = belief::find_joint(context_.scene, move.joint);
+    if (index) move.type = context_.scene.joints[static_cast<std::size_t>(*index)].type;
     const bool hinge = move.type == belief::JointType::kHinge;
     if (const LocatedValue* at = hinge ? fields.require("to_deg", "give the position of the hinge in degrees")
-                                       : fields.require("to", "give the position of the slider in m"))
-      move.to =
-          (hinge ? geometry::kDegree : 1.0) * read_number(*at, problems_, hinge ? kTurnedBy : kPosition).value_or(0.0);
+                                       : fields.require("to", "give the position of the slider in m")) {
+      const std::optional<double> to = read_number(*at, problems_, hinge ? kTurnedBy : kPosition);
+      move.to = (hinge ? geometry::kDegree : 1.0) * to.value_or(0.0);
+      if (to && index) check_reach(context_.scene.joints[static_cast<std::size_t>(*index)], move.to, *at);
+    }
     fields.read("duration", move.duration, kDuration);
     force(fields, move.force);
     point(fields, "handle", move.handle_C);
