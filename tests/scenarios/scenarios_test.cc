@@ -135,7 +135,12 @@ INSTANTIATE_TEST_SUITE_P(Files, ForeseenScenario,
                                          Case{"tossed_cube", 0.0, 0.0, 256}, Case{"tossed_unequal_box", 0.0, 0.0, 256},
                                          Case{"plate_of_balls", 0.0, 0.0, 64}, Case{"pushed_stack", 0.0, 0.0, 64},
                                          Case{"bottle_by_the_edge", 0.0, 0.0, 64}, Case{"tossed_box", 0.0, 0.0, 256},
-                                         Case{"mug_on_hook", 0.0, 0.0, 128}, Case{"spoon_in_mug", 0.0, 0.0, 16}),
+                                         Case{"mug_on_hook", 0.0, 0.0, 128}, Case{"spoon_in_mug", 0.0, 0.0, 16},
+                                         Case{"slipped_carton", 0.0, 0.0, 128}, Case{"bumped_mug", 0.0, 0.0, 128},
+                                         Case{"bottle_pushed_unseen", 0.0, 0.0, 128},
+                                         Case{"drawer_opened", 0.0, 0.0, 64}, Case{"balls_poured", 0.0, 0.0, 16},
+                                         Case{"canister_inserted", 0.0, 0.0, 64}, Case{"stack_of_three", 0.0, 0.0, 64},
+                                         Case{"upright_on_shelf", 0.0, 0.0, 128}),
                          [](const auto& which) { return std::string(which.param.name); });
 
 INSTANTIATE_TEST_SUITE_P(Files, Scenario,
