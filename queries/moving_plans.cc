@@ -24,10 +24,27 @@ std::optional<std::string> moving_errors_reason(const belief::ActionErrors& erro
   return std::nullopt;
 }
 
-class PushPlan final : public PlannedAction {
+/// An action that joins those of the scene, later than it should by the delay.
+class DelayedPlan : public PlannedAction {
+ public:
+  using PlannedAction::PlannedAction;
+
+  int noise_dimensions() const override { return belief::dimensions(query_.errors.delay); }
+  std::vector<belief::Action> begin(std::span<const double> values, std::span<const double> noise,
+                                    belief::WorldState&) const override {
+    std::vector<belief::Action> actions = scene_->actions;
+    actions.push_back(exact(values));
+    actions.back().time += belief::draw(query_.errors.delay, noise);
+    return actions;
+  }
+  /// What gives a blow, and the hand that opens, are not simulated.
+  std::optional<std::string> obstacle(std::span<const double>) override { return std::nullopt; }
+};
+
+class PushPlan final : public DelayedPlan {
  public:
   PushPlan(const Prior& prior, const belief::AchieveQuery& query, std::size_t index, core::ThreadPool& pool)
-      : PlannedAction(prior, query), way_(pool) {
+      : DelayedPlan(prior, query), way_(pool) {
     scene_ = prior.scene;
     X_WO_ = prior.likeliest.objects[index].X_WO;
     mesh_ = belief::collision_mesh(prior.scene->model_of(prior.scene->objects[index]));
@@ -46,13 +63,9 @@ class PushPlan final : public PlannedAction {
     return way_.add_mover("the finger tip", belief::collision_mesh({tip}));
   }
 
-  int noise_dimensions() const override { return belief::dimensions(query_.errors.delay); }
-
   std::vector<belief::Action> begin(std::span<const double> values, std::span<const double> noise,
-                                    belief::WorldState&) const override {
-    std::vector<belief::Action> actions = scene_->actions;
-    actions.push_back(exact(values));
-    actions.back().time += belief::draw(query_.errors.delay, noise);
+                                    belief::WorldState& state) const override {
+    std::vector<belief::Action> actions = DelayedPlan::begin(values, noise, state);
     std::get<belief::Push>(actions.back().what).lateral_error = query_.errors.lateral_error;
     return actions;
   }
@@ -85,27 +98,15 @@ class PushPlan final : public PlannedAction {
   geometry::TriangleMesh mesh_;
 };
 
-class BumpPlan final : public PlannedAction {
+class BumpPlan final : public DelayedPlan {
  public:
-  BumpPlan(const Prior& prior, const belief::AchieveQuery& query, std::size_t index) : PlannedAction(prior, query) {
+  BumpPlan(const Prior& prior, const belief::AchieveQuery& query, std::size_t index) : DelayedPlan(prior, query) {
     scene_ = prior.scene;
     name_ = prior.scene->objects[index].name;
     X_WO_ = prior.likeliest.objects[index].X_WO;
     lowest_ =
         heights_of(belief::collision_mesh(prior.scene->model_of(prior.scene->objects[index])), X_WO_.rotation).first;
   }
-
-  int noise_dimensions() const override { return belief::dimensions(query_.errors.delay); }
-
-  std::vector<belief::Action> begin(std::span<const double> values, std::span<const double> noise,
-                                    belief::WorldState&) const override {
-    std::vector<belief::Action> actions = scene_->actions;
-    actions.push_back(exact(values));
-    actions.back().time += belief::draw(query_.errors.delay, noise);
-    return actions;
-  }
-  /// What gives the blow is not simulated.
-  std::optional<std::string> obstacle(std::span<const double>) override { return std::nullopt; }
 
   belief::Action exact(std::span<const double> values) const override {
     const double angle = geometry::kDegree * value("direction_deg", values);
@@ -125,9 +126,9 @@ class BumpPlan final : public PlannedAction {
   double lowest_ = 0.0;
 };
 
-class ReleasePlan final : public PlannedAction {
+class ReleasePlan final : public DelayedPlan {
  public:
-  ReleasePlan(const Prior& prior, const belief::AchieveQuery& query, std::size_t index) : PlannedAction(prior, query) {
+  ReleasePlan(const Prior& prior, const belief::AchieveQuery& query, std::size_t index) : DelayedPlan(prior, query) {
     const belief::SceneObject& held = prior.scene->objects[index];
     release_.object = held.name;
     release_.retreat = kRetreat * Vector3d::UnitZ();
@@ -144,16 +145,6 @@ class ReleasePlan final : public PlannedAction {
     scene_ = std::move(without);
   }
 
-  int noise_dimensions() const override { return belief::dimensions(query_.errors.delay); }
-
-  std::vector<belief::Action> begin(std::span<const double> values, std::span<const double> noise,
-                                    belief::WorldState&) const override {
-    std::vector<belief::Action> actions = scene_->actions;
-    actions.push_back(exact(values));
-    actions.back().time += belief::draw(query_.errors.delay, noise);
-    return actions;
-  }
-  std::optional<std::string> obstacle(std::span<const double>) override { return std::nullopt; }
   belief::Action exact(std::span<const double> values) const override { return {value("time", values), release_}; }
 
  private:
