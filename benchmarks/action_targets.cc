@@ -33,7 +33,8 @@ Interval wilson(double hits, double n, double z) {
   const double share = hits / n, scale = 1.0 + z * z / n;
   const double middle = (share + 0.5 * z * z / n) / scale;
   const double half = z / scale * std::sqrt(share * (1.0 - share) / n + 0.25 * z * z / (n * n));
-  return {middle - half, middle + half};
+  // Without hits, or with nothing else, one end is exact but for rounding.
+  return {hits > 0.0 ? middle - half : 0.0, hits < n ? middle + half : 1.0};
 }
 
 /// Adds a row for each of the scene's probabilities. Returns whether all agree.
