@@ -17,7 +17,6 @@ constexpr std::size_t kComparedCorners = 16;
 constexpr double kSameCorner = 0.012;  // m
 // Thresholds. Chosen on rooms 1 to 40 (docs/studies/tracking.md).
 constexpr double kLeastOutlineForNow = 0.35;  // of a pose for want of better ones, until it is known what else ends it
-constexpr double kLeastProbability = 0.5;     // of being right (probability_of_fit)
 constexpr double kLogRatioLess = 30.0;        // nats less than DetectionOptions::min_log_ratio are enough
 constexpr double kLeastEvidence = 2.5;        // nats per visible pixel; thin things on a known surface say little
 constexpr double kLeastVisible = 0.2;         // of the pixels that a pose shows, known things in front or not
@@ -29,22 +28,11 @@ constexpr double kPowerOfOutline = 4.0;       // ... and from a surface that goe
 // edges of what it stands on.
 constexpr std::array<double, 3> kUnderIt = {1.0, 0.5, 0.0};
 
-/// A find, its rivals being what was proposed beside it.
-Fit fit_of(const Detection& detection, std::span<const WantedModel> wanted, std::span<const FineProposal> proposals) {
+Fit fit_of(int model, const Pose& X_CO, const rendering::PoseEvidence& evidence, std::span<const WantedModel> wanted) {
   Fit fit;
-  fit.target = &wanted[static_cast<std::size_t>(detection.model)].target;
-  fit.X_CO = detection.X_CO;
-  fit.evidence = detection.evidence;
-  const Vector3d centre = fit.X_CO * fit.target->centre();
-  const double apart = 0.5 * static_cast<double>(fit.target->mesh->radius);
-  for (const FineProposal& other : proposals) {
-    const double log_ratio = other.candidate.evidence.log_ratio;
-    if (other.model != detection.model) {
-      if (other.cluster == detection.cluster) fit.rival_models = std::max(fit.rival_models, log_ratio);
-    } else if ((other.candidate.X_CO * fit.target->centre() - centre).norm() > apart) {
-      fit.rival_poses = std::max(fit.rival_poses, log_ratio);
-    }
-  }
+  fit.target = &wanted[static_cast<std::size_t>(model)].target;
+  fit.X_CO = X_CO;
+  fit.evidence = evidence;
   return fit;
 }
 
@@ -119,10 +107,7 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
   };
   const auto worse = [](const FineProposal& a, const FineProposal& b) { return a.score() < b.score(); };
   const auto look_at = [&](FineProposal& p) {
-    Fit fit;
-    fit.target = &wanted[static_cast<std::size_t>(p.model)].target;
-    fit.X_CO = p.candidate.X_CO;
-    fit.evidence = p.candidate.evidence;
+    const Fit fit = fit_of(p.model, p.candidate.X_CO, p.candidate.evidence, wanted);
     FitNumbers numbers = fit_numbers(fit, terms, *tools.renderer);
     numbers[kFitRivalModels] = numbers[kFitRivalPoses] = 0.0F;  // rivals compete by their scores
     p.outline = static_cast<double>(numbers[kFitOutline]);
@@ -166,7 +151,7 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
       look_at(*best);
       continue;  // it may not be the best any more
     }
-    if (!for_now && best->probability < kLeastProbability) {
+    if (!for_now && best->probability < options.least_probability) {
       waiting.push_back(*best);
       proposals.erase(best);
       continue;
@@ -214,8 +199,9 @@ void settle_in_fine(const rendering::FrameTerms& terms, std::span<const WantedMo
     rendering::FrameTerms mine = terms;
     for (std::size_t j = 0; j < found.size(); ++j)
       if (j != i) with_known_surfaces(mine, depths[j], &mine);
-    found[i].numbers = fit_numbers(fit_of(found[i], wanted, proposals), mine, *tools.renderer);
-    found[i].probability = probability_of_fit(found[i].numbers);
+    Fit fit = fit_of(found[i].model, found[i].X_CO, found[i].evidence, wanted);
+    set_rivals_among(proposals, found[i].model, found[i].cluster, fit);
+    found[i].probability = probability_of_fit(fit_numbers(fit, mine, *tools.renderer));
   }
 }
 

@@ -18,9 +18,8 @@ constexpr int kFineRounds = 4;
 constexpr double kSameCluster = 0.9;      // share of the pixels of clusters that are the same
 constexpr int kLooks = 2;                 // each from other random starts, while a cluster stays unexplained
 constexpr double kSameShapeShare = 0.15;  // of the log ratio
-/// What is asked of finds between rounds, and at the end. Chosen on rooms 1 to 40.
+/// What is asked of finds between rounds. Chosen on rooms 1 to 40.
 constexpr LeastOfFind kForNow = {.outline = 0.35, .probability = 0.0};
-constexpr LeastOfFind kAtTheEnd = {.outline = kLeastOutline, .probability = 0.5};
 // What competes is refined once more at the resolution at which it is judged.
 constexpr RefineOptions kFineRefine = {.steps = 6, .first_gate = 0.02, .last_gate = 0.008};
 
@@ -128,6 +127,7 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const Fi
   const geometry::DepthImage nothing(fine.camera.width, fine.camera.height);
   geometry::DepthImage explained_depth = nothing;
   const auto known_mask = explained_pixels(sampled, known, terms.camera, kExplainedDepth);
+  const LeastOfFind at_the_end = {.outline = kLeastOutline, .probability = options.least_probability};
   std::vector<Detection> found;
   std::vector<Cluster> looked_at;
   std::vector<FineProposal> pool;
@@ -151,7 +151,7 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const Fi
     settle_in_fine(fine, wanted, weighing, options, tools, stream, pool, found);
     const bool is_strict = round % 2 == 1;
     const std::vector<Detection> taken =
-        take_back_in_fine(surroundings, wanted, options, is_strict ? kAtTheEnd : kForNow, left, found);
+        take_back_in_fine(surroundings, wanted, options, is_strict ? at_the_end : kForNow, left, found);
     // It would be accepted again, in place of what is right.
     if (is_strict)
       std::erase_if(pool, [&](const FineProposal& p) {

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "detection_parts.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::filter {
 namespace {
 
-constexpr double kEdgeStep = 0.02;    // m, as detection.cc asks of an outline
 constexpr double kFarThrough = 0.03;  // m behind the surface
 constexpr double kNearPoint = 0.015;  // m between a cluster's point and the surface that explains it
 constexpr double kOneSurface = 0.03;  // m between neighbouring pixels of which a normal is made
@@ -84,7 +84,7 @@ FitNumbers fit_numbers(const Fit& fit, const rendering::FrameTerms& terms, rende
   set(kFitHits, e.hit_share());
   set(kFitVisible, e.in_view > 0 ? static_cast<double>(e.visible) / e.in_view : 0.0);
   set(kFitPixels, std::log(1.0 + e.visible));
-  set(kFitOutline, outline_support(terms, view.depth, kEdgeStep));
+  set(kFitOutline, outline_support(terms, view.depth, kOutlineStep));
   set(kFitStands, fit.stands ? 1.0 : 0.0);
 
   int covered = 0, hidden = 0, behind = 0, far_behind = 0, front = 0, missing = 0, hits = 0, normals = 0, border = 0;

@@ -60,7 +60,7 @@ void ProposalJudge::judge(const rendering::FrameTerms& terms, const std::vector<
     const bool same = p.is_judged && p.judged_standing == p.stands && p.judged.log_ratio == e.log_ratio &&
                       p.judged.covered == e.covered && p.judged.visible == e.visible && p.judged.hits == e.hits;
     Fit fit = fit_of(p.model, p.candidate.X_CO, e, clusters[static_cast<std::size_t>(p.cluster)], p.stands);
-    set_rivals_among(proposals, i, fit);
+    set_rivals_among(std::span<const Proposal>(proposals), p.model, p.cluster, fit);
     const FitNumbers before = p.numbers;
     if (same)
       set_rivals(fit, p.numbers);
@@ -100,21 +100,6 @@ Fit ProposalJudge::fit_of(int model, const Pose& X_CO, const rendering::PoseEvid
   fit.up_C = up_C_;
   fit.stands = stands;
   return fit;
-}
-
-void ProposalJudge::set_rivals_among(const std::vector<Proposal>& proposals, std::size_t mine, Fit& fit) const {
-  const Proposal& own = proposals[mine];
-  const Vector3d centre = own.candidate.X_CO * fit.target->centre();
-  const double apart = 0.5 * static_cast<double>(fit.target->mesh->radius);
-  for (std::size_t i = 0; i < proposals.size(); ++i) {
-    const Proposal& other = proposals[i];
-    const double log_ratio = other.candidate.evidence.log_ratio;
-    if (other.model != own.model) {
-      if (other.cluster == own.cluster) fit.rival_models = std::max(fit.rival_models, log_ratio);
-    } else if ((other.candidate.X_CO * fit.target->centre() - centre).norm() > apart) {
-      fit.rival_poses = std::max(fit.rival_poses, log_ratio);
-    }
-  }
 }
 
 }  // namespace prescene::filter

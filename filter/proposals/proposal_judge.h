@@ -2,6 +2,7 @@
 // Poses that were proposed for a model in a cluster, and who decides which of them are right.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -34,6 +35,22 @@ struct Proposal {
   void weigh(bool on_something);
 };
 
+/// Tells a fit who its rivals are among what was proposed, of either kind of proposal: other models in its cluster, and
+/// its own model elsewhere.
+template <class Proposed>
+void set_rivals_among(std::span<const Proposed> proposals, int model, int cluster, Fit& fit) {
+  const Vector3d centre = fit.X_CO * fit.target->centre();
+  const double apart = 0.5 * static_cast<double>(fit.target->mesh->radius);
+  for (const Proposed& other : proposals) {
+    const double log_ratio = other.candidate.evidence.log_ratio;
+    if (other.model != model) {
+      if (other.cluster == cluster) fit.rival_models = std::max(fit.rival_models, log_ratio);
+    } else if ((other.candidate.X_CO * fit.target->centre() - centre).norm() > apart) {
+      fit.rival_poses = std::max(fit.rival_poses, log_ratio);
+    }
+  }
+}
+
 /// By the thresholds.
 bool acceptable(const rendering::PoseEvidence& evidence, double cost, const DetectionOptions& options);
 
@@ -65,7 +82,6 @@ class ProposalJudge {
  private:
   Fit fit_of(int model, const Pose& X_CO, const rendering::PoseEvidence& evidence, const Cluster& cluster,
              bool stands) const;
-  void set_rivals_among(const std::vector<Proposal>& proposals, std::size_t mine, Fit& fit) const;
 
   std::span<const WantedModel> wanted_;
   Vector3d up_C_;
