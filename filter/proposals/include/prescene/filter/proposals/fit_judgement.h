@@ -65,8 +65,8 @@ struct Fit {
 FitNumbers fit_numbers(const Fit& fit, const rendering::FrameTerms& terms, rendering::Renderer& renderer);
 /// Probability that a pose which fits the fine image (fine_frame.h) like this is right: logistic regression on its
 /// share of the expected evidence, its outline, its residuals and its rivals. In cross-validation over 260 simulated
-/// rooms, more numbers told no more (docs/studies/tracking.md). What is learned of the models themselves is
-/// BoostedTrees to tell.
+/// rooms, more numbers gained next to nothing (docs/studies/tracking.md). Where a scene's own models were learned,
+/// LearnedProposals::fit decides instead.
 double probability_of_fit(const FitNumbers& numbers);
 /// Only kFitRivalModels, kFitRivalPoses: they change when others do.
 void set_rivals(const Fit& fit, FitNumbers& numbers);
