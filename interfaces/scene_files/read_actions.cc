@@ -195,7 +195,7 @@ class ActionReader {
     constexpr double kRounding = 1e-9;
     if (to < joint.low - kRounding || to > joint.high + kRounding)
       problems_.add(at.place, at.path, interfaces::quote(joint.name) + " does not get there",
-                    "give a position within the limits of the joint");
+                    "give a position within its limits");
   }
   belief::MoveJoint read_move_joint(Binder& fields) {
     belief::MoveJoint move;
