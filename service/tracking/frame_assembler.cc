@@ -7,6 +7,7 @@
 #include <iterator>
 #include <utility>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 
@@ -34,6 +35,12 @@ bool too_many(const Entries& entries, std::size_t most, Image Entries::value_typ
   std::size_t pixels = 0;
   for (const auto& entry : entries) pixels += (entry.*image)->size();
   return entries.size() > most || (entries.size() > 1 && pixels > kMaxWaitingPixels);
+}
+
+std::string text_of(const geometry::PinholeCamera& camera) {
+  const auto pair = [](double x, double y) { return core::fixed_text(x, 1) + " and " + core::fixed_text(y, 1); };
+  return std::to_string(camera.width) + " x " + std::to_string(camera.height) + " pixels, focal lengths " +
+         pair(camera.fx, camera.fy) + ", principal point " + pair(camera.cx, camera.cy);
 }
 
 }  // namespace
@@ -258,7 +265,14 @@ bool FrameAssembler::is_out_of_time(const Waiting& waiting, core::TimeNs now_ns)
 
 std::optional<AssembledFrame> FrameAssembler::finish(std::size_t index, AssembledFrame&& frame) {
   const Waiting taken = waiting_[index];
-  last_taken_ = Taken{taken.stamp_ns, taken.received_ns};
+  if (last_taken_ && (last_taken_->camera != *camera_ || last_taken_->lens != lens_)) {
+    const bool is_lens = last_taken_->camera == *camera_;
+    frame.doubts.push_back(
+        "the camera info has changed" +
+        (is_lens ? " in its lens" : " from " + text_of(last_taken_->camera) + " to " + text_of(*camera_)) +
+        ": the new one is used; if the camera was not set otherwise, two nodes publish it");
+  }
+  last_taken_ = Taken{taken.stamp_ns, taken.received_ns, *camera_, lens_};
   for (std::size_t older = 0; older < index; ++older) skip(waiting_[older], "a newer frame was ready");
   waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(index + 1));
   // Last, as it needs memory: the frame is gone even if there is none.

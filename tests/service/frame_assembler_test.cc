@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/tracking/frame_assembler.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <cstring>
 #include <utility>
@@ -197,6 +197,33 @@ TEST(FrameAssembler, ACameraInfoOfAnotherSizeIsNamed) {
   const auto skipped = assembler.take_skipped();
   ASSERT_EQ(skipped.size(), 1u);
   EXPECT_NE(skipped[0].reason.find("16 x 6"), std::string::npos);
+}
+
+TEST(FrameAssembler, SaysOnceWhenTheCameraInfoChanges) {
+  AssemblerSettings settings = without_color();
+  settings.X_WC = geometry::Pose::identity();
+  FrameAssembler assembler(settings, {});
+  MessageIndex index = 0;
+  const auto doubts_with = [&](const geometry::PinholeCamera& camera, const geometry::LensDistortion& lens) {
+    const core::TimeNs now_ns = 100 * kMs * (index + 1);
+    EXPECT_TRUE(assembler.add_camera_info(interfaces::to_ros_camera_info(camera, header(0), lens), ++index).ok());
+    EXPECT_TRUE(assembler.add_depth(depth_at(now_ns, camera.width), ++index, now_ns).ok());
+    const auto frame = assembler.take(now_ns);
+    if (!frame) return std::vector<std::string>{"no frame"};
+    EXPECT_EQ(frame->observation.frame.camera, camera);
+    return frame->doubts;
+  };
+  const geometry::PinholeCamera first{8, 6, 10.0, 10.0, 3.5, 2.5}, zoomed{8, 6, 20.0, 20.0, 3.5, 2.5};
+  const geometry::PinholeCamera larger{16, 6, 20.0, 20.0, 7.5, 2.5};
+  geometry::LensDistortion lens;
+  EXPECT_THAT(doubts_with(first, lens), testing::IsEmpty());
+  EXPECT_THAT(doubts_with(first, lens), testing::IsEmpty());
+  EXPECT_THAT(doubts_with(zoomed, lens),
+              testing::ElementsAre(testing::AllOf(testing::HasSubstr("from 8 x 6 pixels, focal lengths 10.0 and 10.0"),
+                                                  testing::HasSubstr("to 8 x 6 pixels, focal lengths 20.0 and 20.0"))));
+  EXPECT_THAT(doubts_with(zoomed, lens), testing::IsEmpty());
+  EXPECT_THAT(doubts_with(larger, lens), testing::ElementsAre(testing::HasSubstr("to 16 x 6 pixels")));
+  EXPECT_THAT(doubts_with(larger, lens), testing::IsEmpty());
 }
 
 TEST(FrameAssembler, UsesTheSetCameraPoseWhenTfKnowsNone) {

@@ -64,7 +64,8 @@ struct AssembledFrame {
   MessageIndex camera_info = 0;
   /// All messages of tf and joint states up to this number had been taken in when the poses were looked up.
   MessageIndex tf_until = 0;
-  std::vector<std::string> doubts;  ///< Of its depth image and camera info: an unlikely unit, an unknown lens.
+  std::vector<std::string>
+      doubts;  ///< Of its depth image and camera info: an unlikely unit, an unknown or a changed lens.
 };
 
 struct SkippedFrame {
@@ -189,6 +190,8 @@ class FrameAssembler {
   struct Taken {
     core::TimeNs stamp_ns;
     core::TimeNs received_ns;
+    geometry::PinholeCamera camera;
+    geometry::LensDistortion lens;
   };
   std::optional<Taken> last_taken_;
   std::optional<DepthTimes> newest_;
