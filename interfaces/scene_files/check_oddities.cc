@@ -61,6 +61,20 @@ const LocatedValue* looping_joint(const LocatedValue& document, const belief::Sc
   return joints->find(scene.joints[static_cast<std::size_t>(first)].name);
 }
 
+/// The first action that can not be carried out in the scene; null: each can.
+const LocatedValue* impossible_action(const LocatedValue& document, const belief::Scene& scene) {
+  const LocatedValue* actions = document.find("actions");
+  if (actions == nullptr || actions->items.size() != scene.actions.size()) return nullptr;
+  belief::Scene alone = scene;
+  alone.actions.clear();
+  if (!belief::validate(alone).ok()) return nullptr;
+  for (std::size_t i = 0; i < scene.actions.size(); ++i) {
+    alone.actions = {scene.actions[i]};
+    if (!belief::validate(alone).ok()) return &actions->items[i];
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 void add_invalid(const FilePlace& place, std::string_view key, const core::Status& invalid, Problems& problems) {
@@ -76,6 +90,7 @@ void add_invalid_scene(const LocatedValue& document, const belief::Scene& scene,
                        Problems& problems) {
   const LocatedValue* at = named_place(document, invalid.message());
   if (at == nullptr) at = looping_joint(document, scene);
+  if (at == nullptr) at = impossible_action(document, scene);
   if (at == nullptr)
     add_invalid({document.place.file, 0, 0}, "", invalid, problems);
   else

@@ -160,6 +160,10 @@ TEST(JointsFile, AJointIsMovedToAPositionOfItsOwnUnitWithinItsLimits) {
   };
   EXPECT_THAT(turned("to: 0.2").errors, HasSubstr("give the position of the hinge in degrees"));
   EXPECT_THAT(turned("to_deg: 120").errors, HasSubstr("within its limits"));
+  EXPECT_EQ(turned("to_deg: 20, handle: [0.1, 0, 0]").errors, "");
+  EXPECT_THAT(turned("to_deg: 20, handle: [-0.05, 0, 0.1]").errors,
+              AllOf(HasSubstr("s.yaml:18: actions"), HasSubstr("on the axis of the joint 'slide'"),
+                    HasSubstr("give another point")));
 }
 
 TEST(JointsFile, WarnsOfStartsThatSpreadAcrossTheJoint) {
