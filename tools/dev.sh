@@ -7,13 +7,14 @@ usage() {
   cat << 'END'
 usage: ./dev VERB
 
-  setup [run|develop|docs|python|MODULE]...
+  setup [run|develop|docs|python|package|MODULE]...
                                install the missing Debian packages (default: run), or those that a module needs
   build [PRESET] [TARGET]...   build (default preset: release)
   test [--preset P] [--all] [FILTER]...
                                build, then run the tests of tests/, with --all also those that take long, or those whose
                                name matches a FILTER (regular expressions); --long K/N: the K-th of N parts of the long ones
   python [TEST]...             make the Python package in build/python/site and run its tests, or those whose names match
+  package [python]             make the Debian packages in build/release, or that of the Python package in build/python
   demo                         record, replay and ask about a carton carried over a bin; report in build/demo/
   bench [NAME [OPTION]...]     run the benchmark NAME (default: all); results in build/bench/NAME.json
   lint [FILE | --recent K/N]   format, layer and clang-tidy checks; --recent: clang-tidy on what is new since origin/main (or
@@ -164,6 +165,24 @@ verb_python() {
   say "PYTHONPATH=$PWD/build/python/site /usr/bin/python3"
 }
 
+# ---------------------------------------------------------------------------------------------------- Debian packages
+
+# CPack asks dpkg-shlibdeps and file, which no build needs, what the programs depend on.
+verb_package() {
+  local folder=build/release
+  [ $# = 0 ] || [ "$*" = python ] || fail "package takes nothing or 'python'"
+  verb_setup run package
+  if [ "${1:-}" = python ]; then
+    folder=build/python
+    verb_setup python
+    verb_build python prescene_python
+  else
+    verb_build release
+  fi
+  timed "make the packages" env -C "$folder" cpack -G DEB
+  say "packages in $folder: $(cd "$folder" && ls -- *.deb | paste -sd' ' -)"
+}
+
 # ---------------------------------------------------------------------------------------------------- demo, bench
 
 verb_demo() {
@@ -296,7 +315,7 @@ verb_bless() {
 verb=${1:-help}
 [ $# = 0 ] || shift
 case $verb in
-  setup | build | test | python | demo | bench | lint | format | faults | fuzz | docs | bless) "verb_$verb" "$@" ;;
+  setup | build | test | python | package | demo | bench | lint | format | faults | fuzz | docs | bless) "verb_$verb" "$@" ;;
   trace-diff) exec tools/trace-diff "$@" ;;
   help | -h | --help) usage ;;
   *) usage >&2; exit 2 ;;

@@ -9,7 +9,7 @@ for name in collision collision_spheres collision/dops; do
   found=$("$packages" "$name" | LC_ALL=C sort | paste -sd' ' -)
   [ "$found" = "$expected" ] || { echo "$name needs $expected, but is given $found"; exit 1; }
 done
-everything=$("$packages" run develop | wc -l)
-listed=$(grep -c '^\(run\|develop\) ' "$1/tools/packages.txt")
+everything=$("$packages" run develop package | wc -l)
+listed=$(grep -c '^\(run\|develop\|package\) ' "$1/tools/packages.txt")
 [ "$everything" = "$listed" ] || { echo "$listed packages are listed, $everything named"; exit 1; }
 if "$packages" collission 2> /dev/null; then echo "a module that does not exist is taken"; exit 1; fi
