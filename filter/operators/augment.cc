@@ -136,15 +136,18 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const Pose X_WO = frame.X_WC * found.X_CO;
   // A support that is a little higher than the scene says looks like the top of something inside it.
   if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > kMostOverlap) return false;
-  const double outline =
-      outline_support(terms, depth_of(target, found.X_CO, terms.camera, *tools.renderer), weighting.outline_step);
+  const double outline = outline_support(terms, depth_of(target, found.X_CO, terms.camera, *tools.renderer),
+                                         weighting.outline_step, OutlineHoles::kMayEnd);
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double reach = std::max(0.10, options.reach_speed * unseen);
   const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;
   const double needed = options.accept_evidence + (far ? options.far_evidence : 0.0);
   // Far from where it was, what is seen has to speak for itself.
-  const double scale = far ? 1.0 : evidence_scale(expected_evidence_of(terms, target, found.X_CO, *tools.renderer));
-  if (supported_evidence(e, outline, weighting) < scale * needed) return false;
+  const double scale =
+      far ? 1.0 : evidence_scale(expected_evidence_of(terms, target, found.X_CO, *tools.renderer).of_visible);
+  const double evidence = supported_evidence(e, outline, weighting);
+  if (evidence < scale * needed) return false;
+  object.evidence_per_pixel = evidence;
   inject(X_WO, spread, stream.for_purpose(core::Purpose::kStartBelief), object);
   return true;
 }

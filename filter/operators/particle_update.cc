@@ -168,7 +168,7 @@ rendering::PoseEvidence ParticleUpdate::evidence(const Pose& X_WO) const {
 double ParticleUpdate::outline(const Pose& X_WO) const {
   if (is_see_through(target_)) return 1.0;
   return outline_support(terms_, depth_of(target_, X_CW_ * X_WO, terms_.camera, *tools_.renderer),
-                         options_.outline_step);
+                         options_.outline_step, OutlineHoles::kMayEnd);
 }
 
 double ParticleUpdate::log_overlap(const Pose& X_WO) const {

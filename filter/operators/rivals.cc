@@ -146,7 +146,7 @@ class RivalSearch {
     const double outline =
         is_see_through ? 1.0
                        : outline_support(terms_, depth_of(target_, frame_.X_CW * X_WO, terms_.camera, *tools_.renderer),
-                                         weighting_.outline_step);
+                                         weighting_.outline_step, OutlineHoles::kMayEnd);
     const double range = weighting_.full_outline - weighting_.min_outline;
     return std::clamp((outline - weighting_.min_outline) / range, 0.0, 1.0) * evidence.log_ratio;
   }

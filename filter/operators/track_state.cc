@@ -20,6 +20,10 @@ constexpr double kFullEvidence = 6.0;
 constexpr int kTrackedPixels = 5;            // at the likelihood's resolution; a pose with fewer is doubtful; chosen
 constexpr double kLeastVisibleShare = 0.08;  // of the covered pixels; with less in sight nothing can be said; chosen
 constexpr double kLeastScale = 0.15;         // however little is expected, some of it has to be seen
+// Evidence is averaged over so many frames that the limit is this far below what a right pose says, but over no more
+// than half a second at 30 Hz.
+constexpr double kClearDeviations = 3.0;
+constexpr double kMostFrames = 15.0;
 
 // A camera's newest frame counts for so many of its frame periods: one frame may be lost. Chosen.
 constexpr double kFreshPeriods = 2.5;
@@ -31,18 +35,40 @@ struct Verdict {
   bool sees = false;
   double evidence_per_pixel = 0.0;
   double scale = 1.0;  // evidence_scale
+  double newest_share = 1.0;
   double visible_share = 0.0;
   int visible_pixels = 0;
 };
 
-Verdict verdict_of(const WeightReport& report) {
+/// Share of this frame in the average of the evidence: 1 where one frame is enough to tell a right pose from a wrong
+/// one. With a share g, the average has g / (2 - g) of the variance of a frame.
+double newest_share(const WeightReport& report, const TrackStateOptions& options) {
+  const double clear = report.expected_evidence - evidence_scale(report.expected_evidence) * options.tracked_evidence;
+  const double ratio = kClearDeviations * report.evidence_deviation / std::max(clear, 1e-9);
+  return 2.0 / (std::clamp(ratio * ratio, 1.0, kMostFrames) + 1.0);
+}
+
+Verdict verdict_of(const WeightReport& report, const TrackStateOptions& options) {
   Verdict verdict;
   verdict.sees = !(report.hidden_weight > 0.5 || report.visible_share < kLeastVisibleShare);
   verdict.evidence_per_pixel = report.evidence_per_pixel;
   verdict.scale = evidence_scale(report.expected_evidence);
+  verdict.newest_share = newest_share(report, options);
   verdict.visible_share = report.visible_share;
   verdict.visible_pixels = report.visible_pixels;
   return verdict;
+}
+
+/// Evidence of the frame and of those before it, which `before` is of.
+double averaged(const Verdict& frame, double before) {
+  if (frame.newest_share >= 1.0) return frame.evidence_per_pixel;
+  return before + frame.newest_share * (frame.evidence_per_pixel - before);
+}
+
+/// Whether the object's evidence is of a frame.
+bool was_seen(const ObjectBelief& object) {
+  return (object.state == TrackState::kTracked || object.state == TrackState::kDoubtful) &&
+         object.evidence_per_pixel != 0.0;
 }
 
 void show(const Verdict& verdict, belief::CameraView& view) {
@@ -109,7 +135,7 @@ void nothing_sees(core::TimeNs stamp_ns, const TrackStateOptions& options, Objec
     object.state = unseen > options.unseen_lost_after ? TrackState::kLost : TrackState::kUnseen;
 }
 
-/// `own`: of the frame, which sees the object; `all`: of all cameras.
+/// `own`: of the frame, which sees the object; `all`: of all cameras, and of the frames before.
 void take(const Verdict& own, const Verdict& all, core::TimeNs stamp_ns, const TrackStateOptions& options,
           ObjectBelief& object) {
   const double lost_evidence = all.scale * options.lost_evidence;
@@ -178,11 +204,14 @@ void mark_found(const TrackedBy& by, ObjectBelief& object) {
 
 void update_track(const WeightReport& report, const TrackedBy& by, const TrackStateOptions& options,
                   ObjectBelief& object) {
-  const Verdict own = verdict_of(report);
+  const Verdict frame = verdict_of(report, options);
+  Verdict own = frame;
   belief::CameraView* view = view_of(by, object);
+  if (view != nullptr ? view->sees && view->evidence_per_pixel != 0.0 : was_seen(object))
+    own.evidence_per_pixel = averaged(frame, view != nullptr ? view->evidence_per_pixel : object.evidence_per_pixel);
   if (view != nullptr) show(own, *view);
   if (own.sees) {
-    take(own, view == nullptr ? own : together(fresh_views(by, object)), by.stamp_ns, options, object);
+    take(frame, view == nullptr ? own : together(fresh_views(by, object)), by.stamp_ns, options, object);
     return;
   }
   // What one camera does not see is no news while another sees it.

@@ -85,8 +85,10 @@ void report_heaviest(const rendering::FrameTerms& terms, const SearchTarget& tar
     if (report.particles[i].hidden) report.hidden_weight += std::exp(particles[i].log_weight);
   const ParticleWeight& heaviest = report.particles[static_cast<std::size_t>(report.heaviest)];
   report.evidence_per_pixel = supported_evidence(heaviest.evidence, heaviest.outline, options);
-  report.expected_evidence = expected_evidence_of(
+  const rendering::ExpectedEvidence expected = expected_evidence_of(
       terms, target, X_WC.inverse() * particles[static_cast<std::size_t>(report.heaviest)].X_WO, *tools.renderer);
+  report.expected_evidence = expected.of_visible;
+  report.evidence_deviation = expected.deviation;
   report.visible_pixels = heaviest.evidence.visible;
   report.visible_share =
       heaviest.evidence.in_view > 0 ? static_cast<double>(heaviest.evidence.visible) / heaviest.evidence.in_view : 0.0;
@@ -119,8 +121,8 @@ void evidence_of_heaviest(const rendering::FrameTerms& terms, const SearchTarget
   ParticleWeight& heaviest = report.particles[best];
   heaviest.evidence = evidence_of(terms, hypothesis(target, X_CO, tempering_pixels(terms, target, X_CO, tools)), tools);
   if (!heaviest.hidden && !is_see_through(target))
-    heaviest.outline =
-        outline_support(terms, depth_of(target, X_CO, terms.camera, *tools.renderer), options.outline_step);
+    heaviest.outline = outline_support(terms, depth_of(target, X_CO, terms.camera, *tools.renderer),
+                                       options.outline_step, OutlineHoles::kMayEnd);
   report_heaviest(terms, target, X_WC, options, tools, particles, report);
 }
 

@@ -272,7 +272,7 @@ std::vector<double> believe(const rendering::FrameTerms& terms, const std::vecto
       continue;
     }
     found[i].probability =
-        probability_right(found[i].evidence, expected_evidence_of(mine, target, found[i].X_CO, *tools.renderer));
+        probability_right(found[i].evidence, expected_evidence_of(mine, target, found[i].X_CO, *tools.renderer).of_all);
   }
   return log_odds;
 }

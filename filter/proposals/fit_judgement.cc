@@ -76,7 +76,7 @@ FitNumbers fit_numbers(const Fit& fit, const rendering::FrameTerms& terms, rende
   if (!renderer.render(scene, terms.camera, Pose::identity(), options, &view).ok()) return numbers;
 
   const rendering::PoseEvidence& e = fit.evidence;
-  const double expected = rendering::expected_evidence(terms, fit.target->material, view.depth, view.normals);
+  const double expected = rendering::expected_evidence(terms, fit.target->material, view.depth, view.normals).of_all;
   set(kFitEvidence, std::log(std::max(1.0, e.log_ratio)));
   set(kFitEvidencePerPixel, e.log_ratio_per_visible_pixel());
   set(kFitEvidenceShare, expected > 0.0 ? std::clamp(e.log_ratio_per_visible_pixel() / expected, -2.0, 2.0) : 0.0);

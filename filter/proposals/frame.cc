@@ -141,8 +141,8 @@ geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, cons
   return depth;
 }
 
-double expected_evidence_of(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
-                            rendering::Renderer& renderer) {
+rendering::ExpectedEvidence expected_evidence_of(const rendering::FrameTerms& terms, const SearchTarget& target,
+                                                 const Pose& X_CO, rendering::Renderer& renderer) {
   rendering::RenderScene scene;
   scene.instances.push_back({target.mesh, X_CO, target.material});
   rendering::RenderOptions options;
@@ -150,7 +150,7 @@ double expected_evidence_of(const rendering::FrameTerms& terms, const SearchTarg
   rendering::RenderedView view;
   // As above; nothing is expected less of it then.
   if (!renderer.render(scene, terms.camera, Pose::identity(), options, &view).ok())
-    return std::numeric_limits<double>::infinity();
+    return {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(), 0.0};
   return rendering::expected_evidence(terms, target.material, view.depth, view.normals);
 }
 
@@ -169,7 +169,8 @@ rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const
   return terms;
 }
 
-double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step) {
+double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step,
+                       OutlineHoles holes) {
   const int width = terms.camera.width, height = terms.camera.height;
   // What is further than two pixels from the object is no matter of its outline.
   int left = width, right = -1, top = height, bottom = -1;
@@ -183,17 +184,20 @@ double outline_support(const rendering::FrameTerms& terms, const geometry::Depth
   left = std::max(0, left - 2), right = std::min(width - 1, right + 2);
   top = std::max(0, top - 2), bottom = std::min(height - 1, bottom + 2);
   geometry::Image<std::uint8_t> matched(width, height, 0);
+  int covered = 0, measured = 0;
   for (int y = top; y <= bottom; ++y)
     for (int x = left; x <= right; ++x) {
       const double z = terms.depth(x, y), d = object_depth(x, y);
+      covered += d > 0.0;
+      measured += d > 0.0 && z > 0.0;
       matched(x, y) = d > 0.0 && z > 0.0 && std::abs(z - d) < std::max(kMatch, 3.0 * terms.model.hit_sigma(d, 1.0));
     }
   const auto matches = [&](int x, int y) { return matched(x, y) != 0; };
-  int ends = 0, goes_on = 0;
+  int ends = 0, goes_on = 0, nothing = 0;
   for (int y = top; y <= bottom; ++y)
     for (int x = left; x <= right; ++x) {
       const double z = terms.depth(x, y);
-      if (z == 0.0 || matches(x, y)) continue;
+      if (matches(x, y)) continue;
       // The matched surface nearest to this pixel, at most two pixels away. The pixels next to it belong to either side
       // as often as not: judge by those two away.
       double edge = 0.0;
@@ -204,12 +208,21 @@ double outline_support(const rendering::FrameTerms& terms, const geometry::Depth
           const int distance = dx * dx + dy * dy;
           if (distance < nearest) nearest = distance, edge = terms.depth(x + dx, y + dy);
         }
-      if (edge == 0.0 || nearest < 4 || z < edge - step) continue;
+      if (edge == 0.0 || nearest < 4) continue;
+      if (z == 0.0) {
+        nothing += holes == OutlineHoles::kMayEnd && !(object_depth(x, y) > 0.0F);
+        continue;
+      }
+      if (z < edge - step) continue;
       const double expected = terms.absent_peak(x, y);
       const bool known = expected > 0.0 && std::abs(z - expected) < 0.5 * step;
       (known || z > edge + step ? ends : goes_on)++;
     }
-  return ends + goes_on == 0 ? 1.0 : static_cast<double>(ends) / (ends + goes_on);
+  if (ends + goes_on == 0) return 1.0;
+  // A surface that goes on returns as much beyond the outline as within it.
+  const double returned = covered > 0 ? static_cast<double>(measured) / covered : 0.0;
+  const double surplus = std::max(0.0, nothing - (1.0 - returned) * (ends + goes_on + nothing));
+  return (ends + surplus) / (ends + goes_on + surplus);
 }
 
 }  // namespace prescene::filter

@@ -12,7 +12,9 @@ namespace {
 
 struct Expectation {
   double log_ratio = 0.0;
-  double visible = 0.0;
+  double visible = 0.0;  ///< Number of visible pixels.
+  double visible_log_ratio = 0.0;
+  double visible_square = 0.0;  ///< Of the squared log ratio of visible pixels.
 };
 
 /// One pixel of an object that is there.
@@ -48,8 +50,12 @@ class PixelExpectation {
   void add(double weight, double depth) {
     const double p = weight * (1.0 - mixture_.missing);
     const double z = std::clamp(depth, model_.options().min_depth, model_.options().max_depth);
-    sum_.log_ratio += p * model_.log_ratio(mixture_, z, absent_);
-    if (z >= mixture_.depth - static_cast<double>(kMatchSigmas) * mixture_.sigma) sum_.visible += p;
+    const double log_ratio = model_.log_ratio(mixture_, z, absent_);
+    sum_.log_ratio += p * log_ratio;
+    if (z < mixture_.depth - static_cast<double>(kMatchSigmas) * mixture_.sigma) return;
+    sum_.visible += p;
+    sum_.visible_log_ratio += p * log_ratio;
+    sum_.visible_square += p * log_ratio * log_ratio;
   }
 
   const SensorModel& model_;
@@ -60,8 +66,8 @@ class PixelExpectation {
 
 }  // namespace
 
-double expected_evidence(const FrameTerms& frame, const SurfaceMaterial& material, const geometry::DepthImage& depth,
-                         const geometry::Image<Vector3f>& normals) {
+ExpectedEvidence expected_evidence(const FrameTerms& frame, const SurfaceMaterial& material,
+                                   const geometry::DepthImage& depth, const geometry::Image<Vector3f>& normals) {
   const int width = frame.camera.width, height = frame.camera.height;
   PRESCENE_CHECK(depth.width() == width && depth.height() == height);
   PRESCENE_CHECK(normals.width() == width && normals.height() == height);
@@ -90,8 +96,18 @@ double expected_evidence(const FrameTerms& frame, const SurfaceMaterial& materia
       const Expectation mine = PixelExpectation(frame.model, mixture, absent).value();
       sum.log_ratio += mine.log_ratio;
       sum.visible += mine.visible;
+      sum.visible_log_ratio += mine.visible_log_ratio;
+      sum.visible_square += mine.visible_square;
     }
-  return sum.visible > 0.0 ? sum.log_ratio / sum.visible : 0.0;
+  ExpectedEvidence expected;
+  if (!(sum.visible > 0.0)) return expected;
+  expected.of_all = sum.log_ratio / sum.visible;
+  expected.of_visible = sum.visible_log_ratio / sum.visible;
+  // Of a ratio of two sums, to first order; that the pixels' means differ is counted as noise, too.
+  const double variance = sum.visible_square / sum.visible - expected.of_visible * expected.of_visible;
+  const double sharing = 1.0 + frame.tempering.weight.correlated_px2 / (static_cast<double>(frame.step) * frame.step);
+  expected.deviation = std::sqrt(std::max(0.0, variance) * sharing / sum.visible);
+  return expected;
 }
 
 }  // namespace prescene::rendering

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "prescene/core/random.h"
 #include "prescene/filter/proposals/learned_colors.h"
 
 namespace prescene::filter_tests {
@@ -54,6 +55,54 @@ TEST(TrackState, AsksOfAPoseWhatItCanSay) {
   EXPECT_EQ(filter::evidence_scale(6.5), 1.0);
   EXPECT_GT(filter::evidence_scale(0.0), 0.0);
   EXPECT_EQ(filter::evidence_scale(std::numeric_limits<double>::infinity()), 1.0);
+}
+
+TEST(TrackState, AveragesWhatOneFrameSaysTooLittleOf) {
+  // Of a right pose 1 nat a pixel is expected, within 0.5: one frame in six would fall below the limit of a half.
+  const filter::TrackStateOptions options;
+  core::RandomStream stream(5, core::Purpose::kTest);
+  const auto noisy = [&](double mean) {
+    WeightReport report = seen(mean + 0.5 * stream.normal());
+    report.expected_evidence = 1.0;
+    report.evidence_deviation = 0.5;
+    return report;
+  };
+  belief::ObjectBelief object;
+  int tracked = 0;
+  for (int i = 0; i < 1000; ++i) {
+    filter::update_track(noisy(1.0), at((i + 1) * kFrameNs), options, object);
+    tracked += object.state == TrackState::kTracked;
+  }
+  EXPECT_GE(tracked, 980);
+  // A pose that becomes wrong is not held for tracked for long.
+  int still_tracked = 0;
+  bool was_lost = false;
+  for (int i = 1000; i < 1030; ++i) {
+    filter::update_track(noisy(-0.7), at((i + 1) * kFrameNs), options, object);
+    still_tracked += object.state == TrackState::kTracked;
+    was_lost = was_lost || object.state == TrackState::kLost;
+  }
+  EXPECT_LE(still_tracked, 4);
+  EXPECT_TRUE(was_lost);
+}
+
+TEST(TrackState, ForgetsWhatWasSeenBeforeItWasHidden) {
+  belief::ObjectBelief object;
+  const filter::TrackStateOptions options;
+  WeightReport right = seen(1.0);
+  right.expected_evidence = 1.0;
+  right.evidence_deviation = 1.0;
+  WeightReport wrong = right;
+  wrong.evidence_per_pixel = -0.2;
+  WeightReport hidden;
+  hidden.hidden_weight = 1.0;
+  for (int i = 1; i < 20; ++i) filter::update_track(right, at(i * kFrameNs), options, object);
+  filter::update_track(wrong, at(20 * kFrameNs), options, object);
+  EXPECT_EQ(object.state, TrackState::kTracked);
+  filter::update_track(hidden, at(21 * kFrameNs), options, object);
+  filter::update_track(wrong, at(22 * kFrameNs), options, object);
+  EXPECT_EQ(object.state, TrackState::kDoubtful);
+  EXPECT_EQ(object.evidence_per_pixel, -0.2);
 }
 
 TEST(TrackState, IsLostOnlyAfterSomeFramesOfContradiction) {

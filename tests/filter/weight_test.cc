@@ -142,6 +142,31 @@ TEST_F(WeightOfABox, AMatchOnAPlateHasNoOutline) {
   EXPECT_GT(outline_support(frame_.terms, here, WeightOptions().outline_step), 0.9);
 }
 
+TEST_F(WeightOfABox, EndsWhereNothingReturnsBeyondIt) {
+  see({});
+  const geometry::DepthImage box = depth_of(target_, frame_.X_CW * X_WO_, frame_.terms.camera, *backends_.renderer);
+  // All that is seen beside it are a few pixels at its own depth, as of a finger that touches it.
+  rendering::FrameTerms terms = frame_.terms;
+  int fingers = 0;
+  for (int y = 0; y < box.height(); ++y)
+    for (int x = 0; x < box.width(); ++x) {
+      if (box(x, y) > 0.0F) continue;
+      terms.depth(x, y) = 0.0F;
+      if (x < 2 || fingers >= 3 || !(box(x - 2, y) > 0.0F)) continue;
+      terms.depth(x, y) = box(x - 2, y);
+      ++fingers;
+    }
+  ASSERT_EQ(fingers, 3);
+  const double step = WeightOptions().outline_step;
+  EXPECT_EQ(outline_support(terms, box, step), 0.0);
+  EXPECT_GT(outline_support(terms, box, step, OutlineHoles::kMayEnd), 0.8);
+  // Where it returns itself no more than what is beside it, holes say nothing.
+  for (int y = 0; y < box.height(); ++y)
+    for (int x = 0; x < box.width(); ++x)
+      if (box(x, y) > 0.0F && (x + y) % 8 != 0) terms.depth(x, y) = 0.0F;
+  EXPECT_LT(outline_support(terms, box, step, OutlineHoles::kMayEnd), 0.7);
+}
+
 // Where the world's origin lies must not matter.
 TEST_F(WeightOfABox, WeightsDoNotDependOnTheWorldFrame) {
   see({});

@@ -31,9 +31,11 @@ void expect_the_mean_of_samples(const SurfaceMaterial& material, double above) {
   input.depth = seen.view();
   input.background = background.view();
   FrameTerms terms;
-  ASSERT_TRUE(make_frame_terms(input, {}, model, &terms).ok());
+  FrameTermsOptions independent;
+  independent.tempering.weight.correlated_px2 = 0.0;
+  ASSERT_TRUE(make_frame_terms(input, independent, model, &terms).ok());
   ASSERT_EQ(terms.step, 1);
-  const double expected = expected_evidence(terms, material, view.depth, view.normals);
+  const ExpectedEvidence expected = expected_evidence(terms, material, view.depth, view.normals);
 
   core::RandomStream stream(7, core::Purpose::kTest);
   AbsentMixture absent;
@@ -41,9 +43,12 @@ void expect_the_mean_of_samples(const SurfaceMaterial& material, double above) {
   absent.peak_depth = 0.8 + above;
   absent.peak_sigma = std::hypot(model.hit_sigma(absent.peak_depth, 1.0), model.options().support_sigma);
   absent.peak_weight = model.options().background_weight;
-  double log_ratio = 0.0;
+  double log_ratio = 0.0, visible_log_ratio = 0.0;
   double visible = 0.0;
-  for (int frame = 0; frame < 100; ++frame)
+  double per_pixel = 0.0, per_pixel_squares = 0.0;
+  constexpr int kFrames = 100;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    double frame_visible = 0.0, frame_log_ratio = 0.0;
     for (int y = 0; y < camera.height; ++y)
       for (int x = 0; x < camera.width; ++x) {
         if (view.depth(x, y) == 0.0F) continue;
@@ -56,10 +61,21 @@ void expect_the_mean_of_samples(const SurfaceMaterial& material, double above) {
         const PixelMixture mixture = model.mixture(material, pixel);
         const double z = model.sample(mixture, absent, stream);
         log_ratio += model.log_ratio(mixture, z, absent);
-        visible += z > 0.0 && z >= mixture.depth - static_cast<double>(kMatchSigmas) * mixture.sigma;
+        if (!(z > 0.0 && z >= mixture.depth - static_cast<double>(kMatchSigmas) * mixture.sigma)) continue;
+        frame_visible += 1.0;
+        frame_log_ratio += model.log_ratio(mixture, z, absent);
       }
+    visible += frame_visible;
+    visible_log_ratio += frame_log_ratio;
+    per_pixel += frame_log_ratio / frame_visible;
+    per_pixel_squares += std::pow(frame_log_ratio / frame_visible, 2);
+  }
   ASSERT_GT(visible, 1000.0);
-  EXPECT_NEAR(expected, log_ratio / visible, 0.1 * std::abs(expected) + 0.1);  // few nodes
+  EXPECT_NEAR(expected.of_all, log_ratio / visible, 0.1 * std::abs(expected.of_all) + 0.1);  // few nodes
+  EXPECT_NEAR(expected.of_visible, visible_log_ratio / visible, 0.1 * std::abs(expected.of_visible) + 0.1);
+  const double mean = per_pixel / kFrames;
+  const double deviation = std::sqrt((per_pixel_squares - kFrames * mean * mean) / (kFrames - 1));
+  EXPECT_NEAR(expected.deviation, deviation, 0.35 * deviation);  // few nodes, 7 % of chance, and means that differ
 }
 
 TEST(ExpectedEvidence, IsTheMeanOverWhatTheCameraMayReturn) {
@@ -87,7 +103,7 @@ TEST(ExpectedEvidence, IsLessOfWhatIsThinAndOfWhatIsSeenThrough) {
     input.background = background.view();
     FrameTerms terms;
     EXPECT_TRUE(make_frame_terms(input, {}, SensorModel(), &terms).ok());
-    return expected_evidence(terms, material, view.depth, view.normals);
+    return expected_evidence(terms, material, view.depth, view.normals).of_visible;
   };
   const double opaque = expected(SurfaceMaterial::opaque(), 0.5);
   EXPECT_GT(opaque, 4.0);
@@ -101,7 +117,8 @@ TEST(ExpectedEvidence, IsLessOfWhatIsThinAndOfWhatIsSeenThrough) {
   FrameTerms terms, hidden;
   ASSERT_TRUE(make_frame_terms(input, {}, SensorModel(), &terms).ok());
   with_known_surfaces(terms, front, &hidden);
-  EXPECT_EQ(expected_evidence(hidden, SurfaceMaterial::opaque(), view.depth, view.normals), 0.0);
+  EXPECT_EQ(expected_evidence(hidden, SurfaceMaterial::opaque(), view.depth, view.normals).of_all, 0.0);
+  EXPECT_EQ(expected_evidence(hidden, SurfaceMaterial::opaque(), view.depth, view.normals).of_visible, 0.0);
 }
 
 }  // namespace

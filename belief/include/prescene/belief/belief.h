@@ -65,7 +65,7 @@ bool operator==(const LearnedColors& a, const LearnedColors& b);
 /// What the newest frame of one of several cameras showed of an object.
 struct CameraView {
   bool sees = false;                ///< It was neither hidden nor out of view.
-  double evidence_per_pixel = 0.0;  ///< As ObjectBelief's, of that frame alone.
+  double evidence_per_pixel = 0.0;  ///< As ObjectBelief's, of that camera's frames alone.
   double evidence_scale = 1.0;      ///< Share of the limits of evidence that its pose has to reach, (0, 1].
   double visible_share = 0.0;
   int visible_pixels = 0;
@@ -79,8 +79,9 @@ struct ObjectBelief {
   std::vector<Particle> particles;
   double existence = 1.0;  ///< Probability that there is such an object at all.
   TrackState state = TrackState::kTracked;
-  /// Evidence of the last frame: nats per visible pixel in favour of the pose against the object's absence.
-  /// (With several cameras: of the newest frames of those that see it.)
+  /// Evidence of the last frame: nats per visible pixel in favour of the pose against the object's absence; 0 = none.
+  /// Where one frame says little (transparent and thin things), of the last ones. (With several cameras: of the newest
+  /// frames of those that see it.)
   double evidence_per_pixel = 0.0;
   /// Share of its pixels that were neither hidden by known occluders nor missing; of the camera that sees most of it.
   double visible_share = 0.0;

@@ -71,7 +71,8 @@ struct WeightReport {
   double evidence_per_pixel = 0.0;
   /// What the heaviest particle's pose would say on average were it right, in the same unit.
   double expected_evidence = std::numeric_limits<double>::infinity();
-  double visible_share = 0.0;  ///< Of the pixels that it covers in view.
+  double evidence_deviation = 0.0;  ///< Standard deviation of that from frame to frame.
+  double visible_share = 0.0;       ///< Of the pixels that it covers in view.
   int visible_pixels = 0;
 };
 

@@ -94,10 +94,10 @@ SearchTarget target_of(const belief::ObjectBelief& object, const belief::Scene& 
 geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,
                               rendering::Renderer& renderer);
 
-/// What the frame says on average of the object if it is there, nats per visible pixel (rendering::expected_evidence);
-/// infinite if it can't be drawn.
-double expected_evidence_of(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
-                            rendering::Renderer& renderer);
+/// What the frame says of the object if it is there (rendering::expected_evidence); infinite, without deviation, if it
+/// can't be drawn.
+rendering::ExpectedEvidence expected_evidence_of(const rendering::FrameTerms& terms, const SearchTarget& target,
+                                                 const Pose& X_CO, rendering::Renderer& renderer);
 
 using rendering::merge_nearest;
 
@@ -106,10 +106,15 @@ using rendering::merge_nearest;
 rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const geometry::DepthImage* const> others,
                                        const Vector3d& p_CQ, double radius);
 
+/// What pixels without a return say of whether a surface ends. A surface that went on would return as often beyond the
+/// outline as within it: those that are missing beyond that share may be where it ended.
+enum class OutlineHoles { kSayNothing, kMayEnd };
+
 /// Share of the edge of what matches an object (its rendered depth in terms.camera) at which the measured surface ends:
 /// just outside, it is further away, or known to be something else. A surface that goes on, past the outline or in
 /// front of the rest of the object, is not the object, however well it matches. 1 when no pixel can tell (hidden by
 /// nearer things, or missing).
-double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step);
+double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step,
+                       OutlineHoles holes = OutlineHoles::kSayNothing);
 
 }  // namespace prescene::filter

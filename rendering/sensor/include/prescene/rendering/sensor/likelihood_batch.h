@@ -80,13 +80,21 @@ void with_known_surfaces(const FrameTerms& frame, const geometry::DepthImage& kn
 /// Nearest of both at each pixel, 0 = nothing: joins the renderings of several known things. Aborts when sizes differ.
 void merge_nearest(const geometry::DepthImage& other, geometry::DepthImage* depth);
 
-/// What a frame says on average of an object that is there and seen: the expectation of log_ratio over that of the
-/// number of visible pixels, nats, over what the camera may return of it. `depth` and `normals`: the object alone,
-/// drawn in frame.camera, 0 = not covered; their size is the camera's (checked). A thin thing on a known surface and a
-/// transparent one say less than others even at their true pose. 0 where nothing of it can be seen. The expectation is
-/// taken by quadrature: three nodes of a hit, of what is behind, and of an outlier.
-double expected_evidence(const FrameTerms& frame, const SurfaceMaterial& material, const geometry::DepthImage& depth,
-                         const geometry::Image<Vector3f>& normals);
+/// What a frame says of an object that is there and seen, over what the camera may return of it. nats per visible
+/// pixel; 0 where nothing of it can be seen.
+struct ExpectedEvidence {
+  double of_all = 0.0;      ///< Expectation of log_ratio over that of the number of visible pixels.
+  double of_visible = 0.0;  ///< The same of visible_log_ratio, without missing returns and what is in front.
+  /// Standard deviation of log_ratio_per_visible_pixel() from frame to frame, at most: pixels within the area that
+  /// errors are correlated over (tempering.weight) count as one.
+  double deviation = 0.0;
+};
+
+/// `depth` and `normals`: the object alone, drawn in frame.camera, 0 = not covered; their size is the camera's
+/// (checked). A thin thing on a known surface and a transparent one say less than others even at their true pose. The
+/// expectation is taken by quadrature: three nodes of a hit, of what is behind, and of an outlier.
+ExpectedEvidence expected_evidence(const FrameTerms& frame, const SurfaceMaterial& material,
+                                   const geometry::DepthImage& depth, const geometry::Image<Vector3f>& normals);
 
 /// One object at one pose. Pointers must outlive the call only.
 struct PoseHypothesis {
