@@ -15,8 +15,8 @@ PixelClass class_of(const SensorModel& model, const SurfaceMaterial& material, c
   c.outlier_density = static_cast<float>(m.outlier / model.range());
   c.missing = static_cast<float>(m.missing);
   c.returned = static_cast<float>(1.0 - m.missing);
-  c.returned_ratio = static_cast<float>((1.0 - m.missing) / (1.0 - m.missing_opaque));
-  c.log_missing_ratio = portable_log(m.missing / m.missing_opaque);
+  c.returned_ratio = static_cast<float>((1.0 - m.missing) / (1.0 - m.missing_unknown));
+  c.log_missing_ratio = portable_log(m.missing / m.missing_unknown);
   c.missing_ratio = static_cast<float>(portable_exp(c.log_missing_ratio));
   return c;
 }

@@ -110,7 +110,7 @@ PixelMixture SensorModel::mixture(const SurfaceMaterial& material, const PixelGe
   m.behind = material.behind;
   m.outlier = material.outlier;
   m.missing = missing_probability(material, pixel.cosine, pixel.outline_px);
-  m.missing_opaque = missing_probability(SurfaceMaterial{}, pixel.cosine, pixel.outline_px);
+  m.missing_unknown = m.missing;
   return m;
 }
 
@@ -134,7 +134,7 @@ double SensorModel::log_density(const PixelMixture& m, double z, const AbsentMix
 }
 
 double SensorModel::log_ratio(const PixelMixture& m, double z, const AbsentMixture& absent, double color_ratio) const {
-  const double absent_missing = absent.missing >= 0.0 ? absent.missing : m.missing_opaque;
+  const double absent_missing = absent.missing >= 0.0 ? absent.missing : m.missing_unknown;
   if (z <= 0.0) return portable_log(m.missing / absent_missing);
   // The colour of an occluder, of what is behind, or of an outlier is as likely as any other.
   PixelMixture colored = m;

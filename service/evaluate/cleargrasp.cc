@@ -55,7 +55,10 @@ class Comparison {
       : model_(model),
         absent_(absent),
         transparent_(model.mixture(rendering::SurfaceMaterial::transparent(), pixel)),
-        opaque_(model.mixture(rendering::SurfaceMaterial::opaque(), pixel)) {}
+        opaque_(model.mixture(rendering::SurfaceMaterial::opaque(), pixel)) {
+    // Both are compared with the same.
+    if (absent_.missing < 0.0) absent_.missing = opaque_.missing;
+  }
 
   double operator()(double z) const {
     const rendering::SensorModelOptions& options = model_.options();

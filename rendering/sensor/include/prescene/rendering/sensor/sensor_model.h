@@ -120,7 +120,9 @@ struct PixelMixture {
   double behind = 0.0;    ///< Distributed as if the object were absent.
   double outlier = 0.0;   ///< Uniform on [min_depth, max_depth].
   double missing = 0.0;
-  double missing_opaque = 0.0;  ///< The same for an opaque surface.
+  /// The same of a background of which nothing is known, were the object absent: as often as the object, so that
+  /// missing returns say nothing. It may be out of range.
+  double missing_unknown = 0.0;
 };
 
 /// What a pixel returns when the object is absent: around a known depth (`peak_weight` > 0), else anywhere in range.

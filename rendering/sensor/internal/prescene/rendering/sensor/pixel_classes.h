@@ -39,7 +39,7 @@ struct PixelClass {
   float outlier_density = 0.0f;  ///< 1/m
   float missing = 0.0f;
   float returned = 0.0f;           ///< 1 - missing.
-  float returned_ratio = 0.0f;     ///< Return against an opaque surface's, for backgrounds whose share is not known.
+  float returned_ratio = 0.0f;     ///< Return with the object against without it, where the background is not known.
   double log_missing_ratio = 0.0;  ///< The same of no return.
   float missing_ratio = 1.0f;      ///< exp of that.
 };
