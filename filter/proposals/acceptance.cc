@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <limits>
+#include <utility>
 
 #include "detection_parts.h"
 #include "prescene/filter/proposals/fit_judgement.h"
@@ -24,16 +26,97 @@ constexpr double kFloatingNats = 30.0;        // that a pose costs which stands 
 constexpr double kFloatingPart = 0.4;         // ... and a share of its log ratio
 constexpr double kPowerOfHits = 8.0;          // how much a pose's score suffers from pixels that do not match ...
 constexpr double kPowerOfOutline = 4.0;       // ... and from a surface that goes on past its outline
+// A find is moved so far on what it stands on, m, and refined there; it is at another place if it stays that far away.
+constexpr std::array<double, 2> kShakes = {0.025, 0.05};
+constexpr RefineOptions kShaken = {.steps = 3, .first_gate = 0.02, .last_gate = 0.008};
+constexpr double kOtherPlace = 0.015;  // m
+// So many other proposals of its model are compared with a find, and must fit better by these log odds.
+constexpr std::size_t kLikelier = 4;
+constexpr double kClearlyLikelier = 1.0;
 // What an object stands on is looked for under the middle of its lowest points, too: its corners may all lie beyond the
 // edges of what it stands on.
 constexpr std::array<double, 3> kUnderIt = {1.0, 0.5, 0.0};
 
-Fit fit_of(int model, const Pose& X_CO, const rendering::PoseEvidence& evidence, std::span<const WantedModel> wanted) {
+Fit fit_of(int model, const Pose& X_CO, const rendering::PoseEvidence& evidence, std::span<const WantedModel> wanted,
+           const Weighing& weighing) {
   Fit fit;
+  fit.color = &weighing.color();
   fit.target = &wanted[static_cast<std::size_t>(model)].target;
   fit.X_CO = X_CO;
   fit.evidence = evidence;
   return fit;
+}
+
+/// Moves a find about on what it stands on, along its own axes, and lets each place follow the frame: takes a better
+/// one, and returns the least number of nats by which another place explains less.
+double shake(const rendering::FrameTerms& terms, const SearchTarget& target, const Weighing& weighing,
+             const Vector3d& up_C, const FilterTools& tools, rendering::LikelihoodWorkspace& workspace,
+             Detection& found) {
+  const Vector3d centre = target.centre();
+  const geometry::Matrix3d R = found.X_CO.rotation.toRotationMatrix();
+  Eigen::Index upright = 0;
+  (R.transpose() * up_C).cwiseAbs().maxCoeff(&upright);
+  std::vector<PoseCandidate> moved;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis == upright) continue;
+    const Vector3d way = (R.col(axis) - up_C * up_C.dot(R.col(axis))).normalized();
+    for (const double distance : kShakes)
+      for (const double side : {-1.0, 1.0}) {
+        PoseCandidate candidate;
+        candidate.X_CO = found.X_CO;
+        candidate.X_CO.translation += side * distance * way;
+        moved.push_back(candidate);
+      }
+  }
+  for (PoseCandidate& candidate : moved) {
+    tools.search->refine(terms, target, kShaken, workspace, std::span(&candidate.X_CO, 1));
+    candidate.evidence = weighing.of(terms, target, candidate.X_CO, workspace);
+    if (candidate.evidence.log_ratio <= found.evidence.log_ratio) continue;
+    std::swap(candidate.X_CO, found.X_CO);
+    std::swap(candidate.evidence, found.evidence);
+  }
+  double margin = std::numeric_limits<double>::infinity();
+  for (const PoseCandidate& candidate : moved)
+    if ((candidate.X_CO * centre - found.X_CO * centre).norm() > kOtherPlace)
+      margin = std::min(margin, found.evidence.log_ratio - candidate.evidence.log_ratio);
+  return margin;
+}
+
+/// Where its own model fits better elsewhere, though it explains less there, a find goes there: what it explained may
+/// be something larger.
+void take_likelier(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const Weighing& weighing,
+                   const DetectionOptions& options, const FilterTools& tools, std::span<const FineProposal> proposals,
+                   rendering::LikelihoodWorkspace& workspace, Detection& found) {
+  const SearchTarget& target = wanted[static_cast<std::size_t>(found.model)].target;
+  const geometry::Box box = box_about(target, found.X_CO);
+  std::vector<FineProposal> others;
+  for (const FineProposal& p : proposals) {
+    if (p.model != found.model ||
+        is_same_place(target, found.X_CO, p.candidate.X_CO, box, box_about(target, p.candidate.X_CO)))
+      continue;
+    others.push_back(p);
+    others.back().candidate.evidence = weighing.of(terms, target, p.candidate.X_CO, workspace);
+    if (!acceptable_in_fine(others.back().candidate.evidence, 0.0, options)) others.pop_back();
+  }
+  if (others.empty()) return;
+  const auto log_odds_of = [&](const Pose& X_CO, const rendering::PoseEvidence& evidence) {
+    FitNumbers numbers = fit_numbers(fit_of(found.model, X_CO, evidence, wanted, weighing), terms, *tools.renderer);
+    numbers[kFitRivalModels] = numbers[kFitRivalPoses] = 0.0F;
+    const double p = probability_of_fit(numbers);
+    return std::log(p / (1.0 - p));
+  };
+  std::stable_sort(others.begin(), others.end(), [](const FineProposal& a, const FineProposal& b) {
+    return a.candidate.evidence.log_ratio > b.candidate.evidence.log_ratio;
+  });
+  others.resize(std::min(others.size(), kLikelier));
+  double best = kClearlyLikelier + log_odds_of(found.X_CO, weighing.of(terms, target, found.X_CO, workspace));
+  for (const FineProposal& p : others) {
+    const double mine = log_odds_of(p.candidate.X_CO, p.candidate.evidence);
+    if (mine <= best) continue;
+    best = mine;
+    found.X_CO = p.candidate.X_CO;
+    found.cluster = p.cluster;
+  }
 }
 
 }  // namespace
@@ -107,7 +190,7 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
   };
   const auto worse = [](const FineProposal& a, const FineProposal& b) { return a.score() < b.score(); };
   const auto look_at = [&](FineProposal& p) {
-    const Fit fit = fit_of(p.model, p.candidate.X_CO, p.candidate.evidence, wanted);
+    const Fit fit = fit_of(p.model, p.candidate.X_CO, p.candidate.evidence, wanted, weighing);
     FitNumbers numbers = fit_numbers(fit, terms, *tools.renderer);
     numbers[kFitRivalModels] = numbers[kFitRivalPoses] = 0.0F;  // rivals compete by their scores
     p.outline = static_cast<double>(numbers[kFitOutline]);
@@ -174,9 +257,10 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
   }
 }
 
-void settle_in_fine(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const Weighing& weighing,
-                    const DetectionOptions& options, const FilterTools& tools, const core::RandomStream& stream,
-                    std::span<const FineProposal> proposals, std::vector<Detection>& found) {
+void settle_in_fine(const rendering::FrameTerms& terms, const Vector3d& up_C, std::span<const WantedModel> wanted,
+                    const Weighing& weighing, const DetectionOptions& options, const FilterTools& tools,
+                    const core::RandomStream& stream, std::span<const FineProposal> proposals, bool is_thorough,
+                    std::vector<Detection>& found) {
   std::vector<geometry::DepthImage> depths = depths_of(found, wanted, terms.camera, tools);
   const rendering::WorkspacePool::Loan workspace(tools.search->workspaces());
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -187,19 +271,21 @@ void settle_in_fine(const rendering::FrameTerms& terms, std::span<const WantedMo
     SearchOptions search = options.search;
     search.refine = kSettling;
     search.polish_candidates = 1;
+    if (is_thorough) take_likelier(mine, wanted, weighing, options, tools, proposals, *workspace, found[i]);
     const Pose starts[] = {found[i].X_CO};
     const auto refined = tools.search->run_serial(mine, target, starts, search, stream.at(i), *workspace);
     found[i].evidence = weighing.of(mine, target, found[i].X_CO, *workspace);
     const rendering::PoseEvidence after = weighing.of(mine, target, refined.front().X_CO, *workspace);
     if (after.log_ratio > found[i].evidence.log_ratio) found[i].X_CO = refined.front().X_CO, found[i].evidence = after;
+    if (is_thorough) found[i].margin = shake(mine, target, weighing, up_C, tools, *workspace, found[i]);
     depths[i] = depth_of(target, found[i].X_CO, terms.camera, *tools.renderer);
-    found[i].outline = outline_support(mine, depths[i], kOutlineStep);
+    found[i].outline = outline_support(mine, depths[i], kOutlineStep, OutlineHoles::kSayNothing, &weighing.color());
   }
   for (std::size_t i = 0; i < found.size(); ++i) {
     rendering::FrameTerms mine = terms;
     for (std::size_t j = 0; j < found.size(); ++j)
       if (j != i) with_known_surfaces(mine, depths[j], &mine);
-    Fit fit = fit_of(found[i].model, found[i].X_CO, found[i].evidence, wanted);
+    Fit fit = fit_of(found[i].model, found[i].X_CO, found[i].evidence, wanted, weighing);
     set_rivals_among(proposals, found[i].model, found[i].cluster, fit);
     found[i].probability = probability_of_fit(fit_numbers(fit, mine, *tools.renderer));
   }

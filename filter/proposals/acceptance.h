@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "prescene/filter/proposals/detection.h"
+#include "prescene/filter/proposals/fine_frame.h"
 
 namespace prescene::filter {
 
@@ -41,8 +42,13 @@ geometry::Box box_about(const SearchTarget& target, const Pose& X_CO);
 /// were chosen: neighbouring pixels of the fine one share their errors.
 class Weighing {
  public:
-  Weighing(const rendering::FrameTerms& coarse, const rendering::FrameTerms& fine, const FilterTools& tools)
-      : share_(std::pow(coarse.camera.fx / fine.camera.fx, 2.0)), batch_(&tools.search->batch()) {}
+  Weighing(const rendering::FrameTerms& coarse, const FineFrame& fine, const FilterTools& tools)
+      : share_(std::pow(coarse.camera.fx / fine.terms.camera.fx, 2.0)),
+        batch_(&tools.search->batch()),
+        color_(&fine.color) {}
+
+  /// Colours of the fine image, which outlive this; empty = none.
+  const geometry::ColorImage& color() const { return *color_; }
 
   rendering::PoseEvidence of(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
                              rendering::LikelihoodWorkspace& workspace) const {
@@ -56,6 +62,7 @@ class Weighing {
  private:
   double share_;
   const rendering::LikelihoodBatch* batch_;
+  const geometry::ColorImage* color_;
 };
 
 /// Gives the proposals of models that are left the evidence that they have in `terms`, and drops the others.
@@ -67,10 +74,12 @@ void accept_in_fine(std::vector<FineProposal> proposals, const Surroundings& sur
                     const FilterTools& tools, rendering::FrameTerms& terms, geometry::DepthImage& known,
                     std::vector<int>& left, std::vector<Detection>& found);
 /// Each accepted object once more, given the others where they are now; gives each the probability that it is right,
-/// `proposals` being all that was proposed.
-void settle_in_fine(const rendering::FrameTerms& terms, std::span<const WantedModel> wanted, const Weighing& weighing,
-                    const DetectionOptions& options, const FilterTools& tools, const core::RandomStream& stream,
-                    std::span<const FineProposal> proposals, std::vector<Detection>& found);
+/// `proposals` being all that was proposed. Thoroughly: other places, beside it and where else its model was proposed,
+/// are tried, too, and Detection::margin is found out.
+void settle_in_fine(const rendering::FrameTerms& terms, const Vector3d& up_C, std::span<const WantedModel> wanted,
+                    const Weighing& weighing, const DetectionOptions& options, const FilterTools& tools,
+                    const core::RandomStream& stream, std::span<const FineProposal> proposals, bool is_thorough,
+                    std::vector<Detection>& found);
 struct LeastOfFind {
   double outline = 0.0;      ///< outline_support
   double probability = 0.0;  ///< Of being right.

@@ -73,8 +73,8 @@ bool stands(const SearchTarget& target, const Pose& X_WO, const Vector3d& up_W,
 }
 
 std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled, const SearchTarget& target,
-                            const Vector3d& up_C, const DetectionOptions& options, const core::RandomStream& stream) {
-  if (target.learned == nullptr) return cluster_starts(cluster, target, up_C, kStandingStarts, options.starts, stream);
+                            const Vector3d& up_C, int random, const core::RandomStream& stream) {
+  if (target.learned == nullptr) return cluster_starts(cluster, target, up_C, kStandingStarts, random, stream);
   std::vector<Pose> starts = learned_starts(*target.learned, sampled.depth, sampled.camera, cluster.points_C, up_C,
                                             kLearnedStarts, stream.for_purpose(core::Purpose::kSurface));
   const std::vector<Pose> others = cluster_starts(cluster, target, up_C, kStandingStarts, kOtherStarts, stream);
@@ -144,9 +144,14 @@ std::vector<Proposal> propose(const rendering::FrameTerms& terms, const SampledD
     else
       found.resize(std::min(found.size(), static_cast<std::size_t>(kKept)));
   };
+  const Vector3d up_C = surroundings.X_WC.rotation.conjugate() * surroundings.up_W;
+  const auto starts = [&](const SearchedModel& task, const core::RandomStream& mine) {
+    return starts_in(clusters[static_cast<std::size_t>(task.cluster)], sampled,
+                     wanted[static_cast<std::size_t>(task.model)].target, up_C, options.starts, mine);
+  };
   std::vector<Proposal> proposals;
-  for (const SearchedModel& task : search_clusters(terms, sampled, clusters, first, surroundings, wanted, left, options,
-                                                   tools, stream, round, keep))
+  for (const SearchedModel& task : search_clusters(terms, clusters.size(), first, surroundings, wanted, left, options,
+                                                   tools, stream, round, starts, keep))
     for (const PoseCandidate& candidate : task.found)
       if (judge.decides() ? !hopeless(candidate.evidence) : acceptable(candidate.evidence, 0.0, options)) {
         Proposal proposal;
@@ -304,15 +309,13 @@ void take_back(const Surroundings& surroundings, std::span<const WantedModel> wa
 
 }  // namespace
 
-std::vector<SearchedModel> search_clusters(const rendering::FrameTerms& terms, const SampledDepth& sampled,
-                                           const std::vector<Cluster>& clusters, std::size_t first,
+std::vector<SearchedModel> search_clusters(const rendering::FrameTerms& terms, std::size_t clusters, std::size_t first,
                                            const Surroundings& surroundings, std::span<const WantedModel> wanted,
                                            std::span<const int> left, const DetectionOptions& options,
                                            const FilterTools& tools, const core::RandomStream& stream,
-                                           std::uint64_t round, const KeepCandidates& keep) {
-  const Vector3d up_C = surroundings.X_WC.rotation.conjugate() * surroundings.up_W;
+                                           std::uint64_t round, const StartsIn& starts, const KeepCandidates& keep) {
   std::vector<SearchedModel> tasks;
-  for (std::size_t cluster = first; cluster < clusters.size(); ++cluster)
+  for (std::size_t cluster = first; cluster < clusters; ++cluster)
     for (std::size_t model = 0; model < wanted.size(); ++model)
       if (left[model] > 0) tasks.push_back({static_cast<int>(cluster), static_cast<int>(model), {}});
   tools.search->threads().for_each_index(tasks.size(), [&](std::size_t i) {
@@ -321,9 +324,7 @@ std::vector<SearchedModel> search_clusters(const rendering::FrameTerms& terms, c
     const SearchTarget& target = wanted[static_cast<std::size_t>(task.model)].target;
     core::RandomStream draws = stream;
     const core::RandomStream mine(draws.next_u64(), core::Purpose::kDetection, round, static_cast<std::uint32_t>(i));
-    const std::vector<Pose> starts =
-        starts_in(clusters[static_cast<std::size_t>(task.cluster)], sampled, target, up_C, options, mine);
-    task.found = tools.search->run_serial(terms, target, starts, options.search, mine, *workspace);
+    task.found = tools.search->run_serial(terms, target, starts(task, mine), options.search, mine, *workspace);
     std::erase_if(task.found, [&](const PoseCandidate& c) {
       return surroundings.solid.overlap(*target.mesh, surroundings.X_WC * c.X_CO, kMostSinking) > 0.0;
     });

@@ -27,9 +27,9 @@ bool hopeless(const rendering::PoseEvidence& e);
 bool stands(const SearchTarget& target, const Pose& X_WO, const Vector3d& up_W,
             std::span<const SupportSurfaces* const> surfaces, std::span<const double> shares);
 /// What a cluster and model are tried from: places that look like learned ones of the model, if there are any, and
-/// random poses.
+/// random poses, of a model that was not learned `random` of them.
 std::vector<Pose> starts_in(const Cluster& cluster, const SampledDepth& sampled, const SearchTarget& target,
-                            const Vector3d& up_C, const DetectionOptions& options, const core::RandomStream& stream);
+                            const Vector3d& up_C, int random, const core::RandomStream& stream);
 /// The poses that a wanted model was found at in a cluster.
 struct SearchedModel {
   int cluster = 0;
@@ -39,14 +39,15 @@ struct SearchedModel {
 /// Keeps of a model's poses, best first, what is worth judging; called in the thread that found them.
 using KeepCandidates =
     std::function<void(const SearchTarget&, rendering::LikelihoodWorkspace&, std::vector<PoseCandidate>&)>;
-/// Looks in each cluster from `first` on for each model of which some are `left`, ordered by cluster and model. Poses
-/// that reach into a support are left out before `keep` is asked.
-std::vector<SearchedModel> search_clusters(const rendering::FrameTerms& terms, const SampledDepth& sampled,
-                                           const std::vector<Cluster>& clusters, std::size_t first,
+/// What a cluster and a model (their numbers) are tried from; called in the thread that tries them.
+using StartsIn = std::function<std::vector<Pose>(const SearchedModel&, const core::RandomStream&)>;
+/// Looks in each of so many clusters from `first` on for each model of which some are `left`, ordered by cluster and
+/// model. Poses that reach into a support are left out before `keep` is asked.
+std::vector<SearchedModel> search_clusters(const rendering::FrameTerms& terms, std::size_t clusters, std::size_t first,
                                            const Surroundings& surroundings, std::span<const WantedModel> wanted,
                                            std::span<const int> left, const DetectionOptions& options,
                                            const FilterTools& tools, const core::RandomStream& stream,
-                                           std::uint64_t round, const KeepCandidates& keep);
+                                           std::uint64_t round, const StartsIn& starts, const KeepCandidates& keep);
 /// The things that were found, as surfaces.
 SupportSurfaces surfaces_of(std::span<const Detection> found, std::span<const WantedModel> wanted, const Pose& X_WC);
 std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, std::span<const WantedModel> wanted,

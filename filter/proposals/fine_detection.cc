@@ -3,21 +3,28 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <memory>
+#include <utility>
 
 #include "acceptance.h"
 #include "detection_parts.h"
 #include "prescene/filter/proposals/fine_frame.h"
+#include "prescene/filter/proposals/resting_starts.h"
 #include "proposal_judge.h"
 
 namespace prescene::filter {
 namespace {
 
-constexpr std::size_t kKeptShapes = 12;  // best poses of a cluster and model that compete
+constexpr std::size_t kKeptShapes = 8;  // best poses of a cluster and model that compete ...
+constexpr std::size_t kKeptShown = 5;   // ... and so many more of which the fine image shows most points
 // Finds whose surface goes on may stay until the next round has looked for what ends it, twice.
 constexpr int kFineRounds = 4;
 constexpr double kSameCluster = 0.9;      // share of the pixels of clusters that are the same
 constexpr int kLooks = 2;                 // each from other random starts, while a cluster stays unexplained
 constexpr double kSameShapeShare = 0.15;  // of the log ratio
+// Starts for each cluster and model: where it may rest, and this share of DetectionOptions::starts at random.
+constexpr int kRestingStarts = 40;
+constexpr double kRandomStarts = 0.5;
 /// What is asked of finds between rounds. Chosen on rooms 1 to 40.
 constexpr LeastOfFind kForNow = {.outline = 0.35, .probability = 0.0};
 // What competes is refined once more at the resolution at which it is judged.
@@ -73,18 +80,49 @@ std::vector<FineProposal> propose_in_fine(const rendering::FrameTerms& terms, co
                                           std::span<const int> left, const DetectionOptions& options,
                                           const FilterTools& tools, const core::RandomStream& stream,
                                           std::uint64_t round) {
+  std::vector<std::shared_ptr<const RestingShape>> resting;
+  for (const WantedModel& model : wanted) resting.push_back(tools.meshes->resting_shape(*model.target.mesh));
+  const Vector3d up_C = surroundings.X_WC.rotation.conjugate() * surroundings.up_W;
   const auto keep = [&](const SearchTarget& target, rendering::LikelihoodWorkspace& workspace,
                         std::vector<PoseCandidate>& found) {
+    const auto model = std::find_if(wanted.begin(), wanted.end(), [&](const auto& w) { return &w.target == &target; });
+    const RestingShape& shape = *resting[static_cast<std::size_t>(model - wanted.begin())];
     std::erase_if(found, [](const PoseCandidate& c) { return hopeless(c.evidence); });
+    // The coarse image may have a right pose behind many wrong ones: some of those of which the fine one shows most.
+    std::vector<std::pair<int, std::size_t>> order;
+    for (std::size_t i = 0; i < found.size(); ++i) order.emplace_back(-points_shown(shape, fine, found[i].X_CO), i);
+    std::sort(order.begin(), order.end());
+    std::vector<PoseCandidate> shown;
+    for (const auto& [points, i] : order) shown.push_back(found[i]);
     keep_distinct_shapes(target, kKeptShapes, found);
+    keep_distinct_shapes(target, kKeptShown, shown);
+    for (const PoseCandidate& candidate : shown) {
+      const geometry::Box box = box_about(target, candidate.X_CO);
+      if (std::none_of(found.begin(), found.end(), [&](const PoseCandidate& other) {
+            return is_same_place(target, other.X_CO, candidate.X_CO, box_about(target, other.X_CO), box);
+          }))
+        found.push_back(candidate);
+    }
     for (PoseCandidate& candidate : found) {
+      candidate.X_CO = slid_about(shape, fine, up_C, candidate.X_CO);
       tools.search->refine(fine, target, kFineRefine, workspace, std::span(&candidate.X_CO, 1));
       candidate.evidence = weighing.of(fine, target, candidate.X_CO, workspace);
     }
   };
+  const int random = static_cast<int>(std::lround(kRandomStarts * options.starts));
+  const std::vector<ClusterShape> shapes =
+      cluster_shapes(std::span(clusters).subspan(first), sampled, fine, surroundings, stream.at(round));
+  const auto starts = [&](const SearchedModel& task, const core::RandomStream& mine) {
+    const auto cluster = static_cast<std::size_t>(task.cluster), model = static_cast<std::size_t>(task.model);
+    std::vector<Pose> all = resting_starts(shapes[cluster - first], *resting[model], fine, surroundings, kRestingStarts,
+                                           mine.for_purpose(core::Purpose::kProposal));
+    const std::vector<Pose> others = starts_in(clusters[cluster], sampled, wanted[model].target, up_C, random, mine);
+    all.insert(all.end(), others.begin(), others.end());
+    return all;
+  };
   std::vector<FineProposal> proposals;
-  for (const SearchedModel& task : search_clusters(terms, sampled, clusters, first, surroundings, wanted, left, options,
-                                                   tools, stream, round, keep))
+  for (const SearchedModel& task : search_clusters(terms, clusters.size(), first, surroundings, wanted, left, options,
+                                                   tools, stream, round, starts, keep))
     for (const PoseCandidate& candidate : task.found) {
       if (!acceptable_in_fine(candidate.evidence, 0.0, options)) continue;
       FineProposal proposal;
@@ -120,7 +158,7 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const Fi
     return detect(frame_terms, known, sampled, surroundings, wanted, options, tools, stream, trace);
   const rendering::FrameTerms terms = with_background(frame_terms, sampled, surroundings);
   const rendering::FrameTerms fine = with_background(fine_frame.terms, sampled, surroundings);
-  const Weighing weighing(terms, fine, tools);
+  const Weighing weighing(terms, fine_frame, tools);
   std::vector<int> left;
   for (const WantedModel& model : wanted) left.push_back(model.count);
   rendering::FrameTerms explained_terms = terms, explained_fine = fine;
@@ -148,8 +186,9 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const Fi
     reweigh(explained_fine, wanted, weighing, left, tools, proposals);
     accept_in_fine(std::move(proposals), surroundings, wanted, weighing, options, tools, explained_fine,
                    explained_depth, left, found);
-    settle_in_fine(fine, wanted, weighing, options, tools, stream, pool, found);
     const bool is_strict = round % 2 == 1;
+    settle_in_fine(fine, surroundings.X_WC.rotation.conjugate() * surroundings.up_W, wanted, weighing, options, tools,
+                   stream, pool, is_strict, found);
     const std::vector<Detection> taken =
         take_back_in_fine(surroundings, wanted, options, is_strict ? at_the_end : kForNow, left, found);
     // It would be accepted again, in place of what is right.
@@ -171,6 +210,10 @@ std::vector<Detection> detect(const rendering::FrameTerms& frame_terms, const Fi
       with_known_surfaces(explained_fine, depth, &explained_fine);
     }
   }
+  for (Detection& detection : found)
+    detection.probability =
+        probability_of_find(detection.probability, detection.margin / std::max(1.0, detection.evidence.log_ratio));
+  std::erase_if(found, [&](const Detection& d) { return d.probability < options.least_probability; });
   return found;
 }
 

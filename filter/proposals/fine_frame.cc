@@ -43,15 +43,21 @@ geometry::DepthImage background_in(const rendering::FrameTerms& terms, const Sam
   return shown;
 }
 
-rendering::FrameTerms fine_terms(const FilterFrame& frame, const belief::Scene& scene,
-                                 const belief::Observation& observation, const FilterTools& tools) {
+FineFrame sampled_fine(const FilterFrame& frame, const belief::Scene& scene, const belief::Observation& observation,
+                       const FilterTools& tools) {
   const belief::RgbdFrame& rgbd = observation.frame;
+  FineFrame fine;
   const int step = std::max(1, (2 * rgbd.camera.width + kFineWidth) / (2 * kFineWidth));
   const int offset = std::min({step / 2, rgbd.camera.width - 1, rgbd.camera.height - 1});
   const geometry::PinholeCamera camera = rgbd.camera.subsampled(step, offset);
   geometry::DepthImage depth(camera.width, camera.height), supports, robot;
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) depth(x, y) = (*rgbd.depth)(offset + step * x, offset + step * y);
+  if (rgbd.color && rgbd.color->width() == rgbd.camera.width && rgbd.color->height() == rgbd.camera.height) {
+    fine.color = geometry::ColorImage(camera.width, camera.height);
+    for (int y = 0; y < camera.height; ++y)
+      for (int x = 0; x < camera.width; ++x) fine.color(x, y) = (*rgbd.color)(offset + step * x, offset + step * y);
+  }
   const BeliefView known = known_surroundings(scene, frame.X_WG, MeshDetail::kDisplay, *tools.meshes);
   rendering::FrameTermsInput input;
   input.camera = camera;
@@ -61,7 +67,7 @@ rendering::FrameTerms fine_terms(const FilterFrame& frame, const belief::Scene& 
   rendering::FrameTermsOptions options;
   options.target_width = camera.width;
   options.tempering = frame.terms.tempering;
-  rendering::FrameTerms terms;
+  rendering::FrameTerms& terms = fine.terms;
   PRESCENE_CHECK(make_frame_terms(input, options, frame.terms.model, &terms).ok());
   // The frame's own image may be a reduced one.
   const int own = rgbd.camera.width / std::max(1, frame.terms.camera.width);
@@ -78,22 +84,24 @@ rendering::FrameTerms fine_terms(const FilterFrame& frame, const belief::Scene& 
   }
   if (draw(known, InstanceKind::kRobot, camera, frame.X_WC, *tools.renderer, &robot))
     with_known_surfaces(terms, robot, &terms);
-  return terms;
+  return fine;
 }
 
 }  // namespace
 
 FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const belief::Observation& observation,
                      const FilterTools& tools) {
-  return {fine_terms(frame, scene, observation, tools),
-          measure_edge_smear(*observation.frame.depth, observation.frame.color.get())};
+  FineFrame fine = sampled_fine(frame, scene, observation, tools);
+  fine.smear = measure_edge_smear(*observation.frame.depth, observation.frame.color.get());
+  return fine;
 }
 
 FineFrame fine_frame_if_sharp(const FilterFrame& frame, const belief::Scene& scene,
                               const belief::Observation& observation, const FilterTools& tools) {
+  const EdgeSmear smear = measure_edge_smear(*observation.frame.depth, observation.frame.color.get());
   FineFrame fine;
-  fine.smear = measure_edge_smear(*observation.frame.depth, observation.frame.color.get());
-  if (fine.smear.is_sharp()) fine.terms = fine_terms(frame, scene, observation, tools);
+  if (smear.is_sharp()) fine = sampled_fine(frame, scene, observation, tools);
+  fine.smear = smear;
   return fine;
 }
 

@@ -2,12 +2,17 @@
 #include "prescene/filter/proposals/frame.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <utility>
 
 namespace prescene::filter {
 namespace {
 
 constexpr double kMatch = 0.008;          // m: a measurement so near to the pose's surface is taken for it
+constexpr int kColorReachWithin = 4;      // pixels between those whose colours are compared within an object
+constexpr int kLeastLight = 90;           // of 3 x 255: what is darker has no colour
+constexpr double kOtherColor = 0.12;      // sum over channels of the difference between shares of the light
 constexpr double kClearlyInFront = 0.02;  // m: a support nearer to the object than this may be what it stands on
 
 core::Status render_depth(const rendering::RenderScene& scene, const geometry::PinholeCamera& camera, const Pose& X_WC,
@@ -34,6 +39,16 @@ rendering::RenderScene only(const BeliefView& view, InstanceKind kind) {
   for (std::size_t i = 0; i < view.kinds.size(); ++i)
     if (view.kinds[i] == kind) scene.instances.push_back(view.scene.instances[i]);
   return scene;
+}
+
+/// Whether two pixels show different colours, whatever the light that falls on them.
+bool are_other_colors(const geometry::Rgb& a, const geometry::Rgb& b) {
+  const int light_a = a[0] + a[1] + a[2], light_b = b[0] + b[1] + b[2];
+  if (light_a < kLeastLight || light_b < kLeastLight) return false;
+  double difference = 0.0;
+  for (std::size_t c = 0; c < 3; ++c)
+    difference += std::abs(static_cast<double>(a[c]) / light_a - static_cast<double>(b[c]) / light_b);
+  return difference > kOtherColor;
 }
 
 }  // namespace
@@ -170,7 +185,7 @@ rendering::FrameTerms terms_for_object(const FilterFrame& frame, std::span<const
 }
 
 double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step,
-                       OutlineHoles holes) {
+                       OutlineHoles holes, const geometry::ColorImage* color) {
   const int width = terms.camera.width, height = terms.camera.height;
   // What is further than two pixels from the object is no matter of its outline.
   int left = width, right = -1, top = height, bottom = -1;
@@ -194,6 +209,7 @@ double outline_support(const rendering::FrameTerms& terms, const geometry::Depth
     }
   const auto matches = [&](int x, int y) { return matched(x, y) != 0; };
   int ends = 0, goes_on = 0, nothing = 0;
+  int others = 0, compared = 0;  // of `goes_on`, where the colour is another one than within
   for (int y = top; y <= bottom; ++y)
     for (int x = left; x <= right; ++x) {
       const double z = terms.depth(x, y);
@@ -201,12 +217,13 @@ double outline_support(const rendering::FrameTerms& terms, const geometry::Depth
       // The matched surface nearest to this pixel, at most two pixels away. The pixels next to it belong to either side
       // as often as not: judge by those two away.
       double edge = 0.0;
-      int nearest = 9;
+      int nearest = 9, edge_x = x, edge_y = y;
       for (int dy = -2; dy <= 2; ++dy)
         for (int dx = -2; dx <= 2; ++dx) {
           if (x + dx < 0 || y + dy < 0 || x + dx >= width || y + dy >= height || !matches(x + dx, y + dy)) continue;
           const int distance = dx * dx + dy * dy;
-          if (distance < nearest) nearest = distance, edge = terms.depth(x + dx, y + dy);
+          if (distance < nearest)
+            nearest = distance, edge = terms.depth(x + dx, y + dy), edge_x = x + dx, edge_y = y + dy;
         }
       if (edge == 0.0 || nearest < 4) continue;
       if (z == 0.0) {
@@ -216,13 +233,38 @@ double outline_support(const rendering::FrameTerms& terms, const geometry::Depth
       if (z < edge - step) continue;
       const double expected = terms.absent_peak(x, y);
       const bool known = expected > 0.0 && std::abs(z - expected) < 0.5 * step;
-      (known || z > edge + step ? ends : goes_on)++;
+      const bool is_end = known || z > edge + step;
+      (is_end ? ends : goes_on)++;
+      if (is_end || color == nullptr || color->empty()) continue;
+      // As far inside of the edge as this pixel is outside.
+      const int in_x = 2 * edge_x - x, in_y = 2 * edge_y - y;
+      if (in_x < 0 || in_y < 0 || in_x >= width || in_y >= height || !matches(in_x, in_y)) continue;
+      ++compared;
+      others += are_other_colors((*color)(x, y), (*color)(in_x, in_y)) ? 1 : 0;
     }
   if (ends + goes_on == 0) return 1.0;
   // A surface that goes on returns as much beyond the outline as within it.
   const double returned = covered > 0 ? static_cast<double>(measured) / covered : 0.0;
   const double surplus = std::max(0.0, nothing - (1.0 - returned) * (ends + goes_on + nothing));
-  return (ends + surplus) / (ends + goes_on + surplus);
+  double ended = ends;
+  if (compared > 0) {
+    // Colours change within an object, too, where it is printed: with a share b of the places within, they change at
+    // q + (1 - q) b of an outline at which a share q ends.
+    int changes = 0, pairs = 0;
+    for (int y = top; y <= bottom; ++y)
+      for (int x = left; x <= right; ++x) {
+        if (!matches(x, y)) continue;
+        for (const auto& [u, v] : {std::pair{x + kColorReachWithin, y}, {x, y + kColorReachWithin}}) {
+          if (u >= width || v >= height || !matches(u, v)) continue;
+          ++pairs;
+          changes += are_other_colors((*color)(x, y), (*color)(u, v)) ? 1 : 0;
+        }
+      }
+    const double within = pairs > 0 ? static_cast<double>(changes) / pairs : 1.0;
+    const double at_outline = static_cast<double>(others) / compared;
+    if (within < 1.0) ended += goes_on * std::max(0.0, (at_outline - within) / (1.0 - within));
+  }
+  return (ended + surplus) / (ends + goes_on + surplus);
 }
 
 }  // namespace prescene::filter

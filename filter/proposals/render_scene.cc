@@ -6,6 +6,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/filter/proposals/facets.h"
+#include "prescene/filter/proposals/resting_starts.h"
 
 namespace prescene::filter {
 namespace {
@@ -86,6 +87,13 @@ double MeshCache::facet_lever(const rendering::RenderMesh& mesh) {
   const auto [entry, is_new] = facet_levers_.try_emplace(mesh.number.value(), 0.0);
   if (is_new) entry->second = filter::facet_lever(mesh);
   return entry->second;
+}
+
+std::shared_ptr<const RestingShape> MeshCache::resting_shape(const rendering::RenderMesh& mesh) {
+  const std::lock_guard lock(mutex_);
+  std::shared_ptr<const RestingShape>& shape = resting_shapes_[mesh.number.value()];
+  if (!shape) shape = std::make_shared<const RestingShape>(resting_shape_of(mesh));
+  return shape;
 }
 
 rendering::SurfaceMaterial material_of(belief::SurfaceKind kind, const belief::Color& color) {

@@ -74,6 +74,12 @@ extern const std::vector<WantedModel> wanted;
 extern const DetectionOptions options;
 }  // namespace fine_frame_h
 
+namespace resting_starts_h {
+extern const std::vector<Cluster> clusters;
+extern const rendering::FrameTerms fine;
+extern const Surroundings surroundings;
+}  // namespace resting_starts_h
+
 namespace frame_h {
 extern const FrameColors colors;
 extern const FrameOptions options;

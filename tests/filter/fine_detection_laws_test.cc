@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "filter_fixture.h"
 #include "prescene/filter/operators/initialise.h"
 #include "prescene/filter/proposals/fine_frame.h"
 #include "prescene/filter/proposals/fit_judgement.h"
+#include "prescene/geometry/primitives.h"
 
 namespace prescene::filter_tests {
 namespace {
@@ -84,8 +86,10 @@ class FineFinding : public ::testing::Test {
     see(models_, poses_);
   }
 
-  void see(const std::vector<belief::ObjectModel>& models, const std::vector<Pose>& poses) {
+  void see(const std::vector<belief::ObjectModel>& models, const std::vector<Pose>& poses,
+           const std::vector<Occluder>& occluders = {}) {
     sequence_ = still_sequence(models, poses);
+    sequence_.occluders = occluders;
     observation_ = sequence_.observe(0, *backends_.renderer);
     scene_ = open_scene(models);
     frame_ = backends_.frame_of(scene_, observation_);
@@ -186,6 +190,33 @@ TEST_F(FineFinding, AStackIsFoundWhole) {
   }
 }
 
+TEST_F(FineFinding, IsFoundWhereOneEndIsHiddenAndBelievedLessWhereBothAre) {
+  const belief::ObjectModel brick = box_model("brick", {0.06, 0.20, 0.10});
+  const Vector3d p_WO(0.0, 0.0, 0.05), towards = (test_camera_pose().translation - p_WO).normalized();
+  const Vector3d aside = Vector3d::UnitZ().cross(towards).normalized();
+  const Pose X_WO{geometry::exp_rotation({0.0, 0.0, std::atan2(-aside.x(), aside.y())}), p_WO};
+  const auto post = [&](double side) {
+    return Occluder{geometry::make_mesh(geometry::BoxShape{{0.10, 0.25, 0.01}}),
+                    fixed({test_camera_pose().rotation, p_WO + 0.2 * towards + side * 0.085 * aside})};
+  };
+  const auto found_behind = [&](const std::vector<Occluder>& posts) {
+    see({brick}, {X_WO}, posts);
+    return found({wanted(brick)});
+  };
+  const std::vector<Detection> seen = found_behind({}), behind_one = found_behind({post(1.0)}),
+                               behind_two = found_behind({post(-1.0), post(1.0)});
+  const SearchTarget target = wanted(brick).target;
+  ASSERT_EQ(seen.size(), 1U);
+  EXPECT_LT(distance(seen[0], X_WO, target), 0.01);
+  ASSERT_EQ(behind_one.size(), 1U);
+  EXPECT_LT(distance(behind_one[0], X_WO, target), 0.02);
+  // With both ends hidden, it may be further to either side.
+  if (!behind_two.empty()) {
+    EXPECT_LT(behind_two[0].probability, behind_one[0].probability);
+    EXPECT_LT(behind_two[0].margin, behind_one[0].margin);
+  }
+}
+
 TEST_F(FineFinding, IsJudgedInTheFineImageOfASharpCameraAlone) {
   const std::vector<WantedModel> models = {wanted(models_[0]), wanted(models_[1]), wanted(models_[2])};
   const std::vector<Detection> sharp = found(models);
@@ -234,6 +265,19 @@ TEST(ProbabilityOfFit, FallsWithAllThatSpeaksAgainstAFitAndWithItsRivals) {
   const double without_rival = probability_of_fit(more);
   more[kFitRivalModels] = 3.0F;
   EXPECT_EQ(probability_of_fit(more), without_rival);
+}
+
+TEST(ProbabilityOfFind, FallsWithTheFitAndWithWhatFitsBesideIt) {
+  EXPECT_GT(probability_of_find(0.99, 1.0), 0.99);
+  for (const double fit : {0.3, 0.6, 0.95})
+    for (const double margin : {0.02, 0.2, 0.9}) {
+      EXPECT_LT(probability_of_find(fit, margin), probability_of_find(fit + 0.04, margin));
+      EXPECT_LT(probability_of_find(fit, margin), probability_of_find(fit, margin + 0.05));
+    }
+  // A place beside it that explains more says no more than one that explains the same, and no other place is no rival.
+  EXPECT_EQ(probability_of_find(0.9, -0.5), probability_of_find(0.9, 0.0));
+  EXPECT_EQ(probability_of_find(0.9, std::numeric_limits<double>::infinity()), probability_of_find(0.9, 1.0));
+  EXPECT_LT(probability_of_find(1.0, 0.0), 1.0);
 }
 
 }  // namespace

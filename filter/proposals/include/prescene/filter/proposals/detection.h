@@ -5,6 +5,7 @@
 //   std::vector<Detection> found = detect(terms, known, sampled, surroundings, wanted, options, tools, stream);
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -18,8 +19,8 @@ namespace prescene::filter {
 
 struct DetectionOptions {
   SegmentationOptions segmentation;
-  /// count. This many random poses are tried for each cluster and model of which nothing was learned. Range 8 to 1000.
-  /// Measured: docs/studies/tracking.md.
+  /// count. This many random poses are tried for each cluster and model of which nothing was learned, half of them
+  /// where finds are judged in the fine image. Range 8 to 1000. Measured: docs/studies/tracking.md.
   int starts = 192;
   SearchOptions search;
   /// count. Only this many clusters are looked at, the largest first. Range 1 to 100. Chosen.
@@ -42,13 +43,14 @@ struct WantedModel {
 struct Detection {
   int model = 0;  ///< Index into the wanted models.
   Pose X_CO;
-  rendering::PoseEvidence evidence;  ///< With the other detections as known surfaces.
-  double outline = 1.0;              ///< outline_support, likewise.
-  bool stands = true;                ///< On a support or another detection.
-  double probability = 1.0;          ///< probability_right, or as the learned judge says.
-  int cluster = 0;                   ///< Of those that were looked at, in their order.
-  FitNumbers numbers{};              ///< What a learned judge saw when it was accepted, ...
-  double log_odds = 0.0;             ///< ... and made of it.
+  rendering::PoseEvidence evidence;                         ///< With the other detections as known surfaces.
+  double outline = 1.0;                                     ///< outline_support, likewise.
+  double margin = std::numeric_limits<double>::infinity();  ///< nats less of the best place beside it, if it was asked.
+  bool stands = true;                                       ///< On a support or another detection.
+  double probability = 1.0;                                 ///< probability_right, or as the learned judge says.
+  int cluster = 0;                                          ///< Of those that were looked at, in their order.
+  FitNumbers numbers{};                                     ///< What a learned judge saw when it was accepted, ...
+  double log_odds = 0.0;                                    ///< ... and made of it.
 };
 
 /// What a judge is learned from: all that was judged.

@@ -21,7 +21,8 @@ inline constexpr int kFineWidth = 320;
 /// What finds are judged in.
 struct FineFrame {
   rendering::FrameTerms terms;
-  EdgeSmear smear;  ///< Of the observation.
+  geometry::ColorImage color;  ///< Of terms.camera; empty = none.
+  EdgeSmear smear;             ///< Of the observation.
 };
 
 /// About kFineWidth pixels wide (no more than the observation), otherwise as frame.terms, with the robot put in.

@@ -57,8 +57,9 @@ struct Fit {
   std::span<const Vector3d> cluster_C;  ///< Points of the cluster that it is to explain.
   Vector3d up_C = -Vector3d::UnitY();
   bool stands = false;
-  double rival_models = 0.0;  ///< Largest log ratio of other models in its cluster, nats; 0 = none.
-  double rival_poses = 0.0;   ///< The same of its own model elsewhere.
+  const geometry::ColorImage* color = nullptr;  ///< Of the frame, as outline_support takes it.
+  double rival_models = 0.0;                    ///< Largest log ratio of other models in its cluster, nats; 0 = none.
+  double rival_poses = 0.0;                     ///< The same of its own model elsewhere.
 };
 
 /// What can't be drawn counts as explaining nothing.
@@ -68,6 +69,9 @@ FitNumbers fit_numbers(const Fit& fit, const rendering::FrameTerms& terms, rende
 /// rooms, more numbers gained next to nothing (docs/studies/tracking.md). Where a scene's own models were learned,
 /// LearnedProposals::fit decides instead.
 double probability_of_fit(const FitNumbers& numbers);
+/// Probability that a find is right whose fit alone has `probability` (probability_of_fit) and of whose log ratio the
+/// best other place beside it lacks a share of `margin`, > 0: where a thing is hidden, several places may fit alike.
+double probability_of_find(double probability, double margin);
 /// Only kFitRivalModels, kFitRivalPoses: they change when others do.
 void set_rivals(const Fit& fit, FitNumbers& numbers);
 

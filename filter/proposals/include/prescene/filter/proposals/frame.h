@@ -114,7 +114,9 @@ enum class OutlineHoles { kSayNothing, kMayEnd };
 /// just outside, it is further away, or known to be something else. A surface that goes on, past the outline or in
 /// front of the rest of the object, is not the object, however well it matches. 1 when no pixel can tell (hidden by
 /// nearer things, or missing).
+/// With `color` (of terms.camera; null or empty = none) a surface that goes on ends where another colour begins, by as
+/// much as colours change there more often than within the object.
 double outline_support(const rendering::FrameTerms& terms, const geometry::DepthImage& object_depth, double step,
-                       OutlineHoles holes = OutlineHoles::kSayNothing);
+                       OutlineHoles holes = OutlineHoles::kSayNothing, const geometry::ColorImage* color = nullptr);
 
 }  // namespace prescene::filter

@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <span>
 #include <string>
@@ -19,6 +20,8 @@
 #include "prescene/rendering/render_scene.h"
 
 namespace prescene::filter {
+
+struct RestingShape;  // prescene/filter/proposals/resting_starts.h
 
 /// How fine a mesh is drawn.
 enum class MeshDetail {
@@ -43,6 +46,8 @@ class MeshCache {
 
   /// facet_lever() (facets.h) of a mesh that get() returned.
   double facet_lever(const rendering::RenderMesh& mesh);
+  /// resting_shape_of() (resting_starts.h) of a mesh that get() returned. Never null.
+  std::shared_ptr<const RestingShape> resting_shape(const rendering::RenderMesh& mesh);
 
  private:
   struct Entry {
@@ -55,7 +60,9 @@ class MeshCache {
   std::map<std::pair<const geometry::TriangleMesh*, MeshDetail>, Entry> by_address_;
   std::map<std::pair<const geometry::TriangleMesh*, const geometry::MeshLook*>, Entry> with_look_;
   std::map<std::pair<std::uint64_t, MeshDetail>, rendering::MeshHandle> by_content_;
-  std::map<std::uint64_t, double> facet_levers_;  // by the mesh's unique number
+  // By the mesh's unique number.
+  std::map<std::uint64_t, double> facet_levers_;
+  std::map<std::uint64_t, std::shared_ptr<const RestingShape>> resting_shapes_;
 };
 
 rendering::SurfaceMaterial material_of(belief::SurfaceKind kind, const belief::Color& color);
