@@ -205,7 +205,7 @@ void ParticleFilter::recover_all(FrameStep& step) {
     if (is_believed && !step.shows(i)) continue;  // another camera sees it
     const double share = share_in(belief, i, step.observation.camera);
     const bool is_seen = is_believed && share >= settings_.weight.hidden_share;
-    if (is_seen && belief.step == 1 && has_wide_prior(belief.scene->objects[i]))
+    if (is_seen && belief.step == 1 && turned_log_odds(belief.scene->objects[i]) > kFoundLogOdds)
       rival(i, RivalPrior::kFound);
     else if (is_seen && share >= kMostlySeen && (step.frame_number() + i) % kRivalsEvery == 0)
       rival(i, RivalPrior::kTracked);

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "frame_step.h"
+#include "prescene/filter/operators/initialise.h"
 #include "prescene/filter/operators/rivals.h"
 #include "prescene/filter/operators/world_terms.h"
 
@@ -55,7 +56,8 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
   if (report.all_impossible) step.result.degraded |= kImpossibleWeights;
   // What is hidden is not distinguished by its turn.
   if (report.hidden_weight < 0.5 && report.visible_share >= settings_.weight.hidden_share)
-    share_among_turns(before, model_of(belief, object).symmetry, seen.particles, seeing_cameras(step.by(), seen));
+    share_among_turns(before, model_of(belief, object).symmetry, seen.particles, seeing_cameras(step.by(), seen),
+                      turned_log_odds(belief.scene->objects[object]));
   for (const ParticleWeight& particle : report.particles) step.result.counters.hidden_particles += particle.hidden;
 }
 

@@ -6,6 +6,8 @@
 #include <limits>
 
 #include "prescene/core/check.h"
+#include "prescene/core/random.h"
+#include "prescene/filter/operators/rivals.h"
 #include "prescene/filter/proposals/fine_frame.h"
 #include "prescene/filter/proposals/support_tracking.h"
 
@@ -40,6 +42,12 @@ Matrix6d prior_covariance(const belief::SceneObject& object) {
     covariance += d * d.transpose() / kSpreadDraws;
   }
   return covariance;
+}
+
+/// Too wide to start from.
+bool is_wide(const Matrix6d& covariance) {
+  return std::sqrt(covariance.diagonal().head<3>().maxCoeff()) > kWideTurn ||
+         std::sqrt(covariance.diagonal().tail<3>().maxCoeff()) > kWideShift;
 }
 
 Matrix6d first_covariance(const InitialiseOptions& options) {
@@ -121,11 +129,16 @@ rendering::SupportRegion upper_face(const belief::Support& support, const Pose& 
 
 }  // namespace
 
-bool has_wide_prior(const belief::SceneObject& object) {
-  if (object.held_by) return false;
-  const Matrix6d covariance = prior_covariance(object);
-  return std::sqrt(covariance.diagonal().head<3>().maxCoeff()) > kWideTurn ||
-         std::sqrt(covariance.diagonal().tail<3>().maxCoeff()) > kWideShift;
+bool has_wide_prior(const belief::SceneObject& object) { return !object.held_by && is_wide(prior_covariance(object)); }
+
+double turned_log_odds(const belief::SceneObject& object) {
+  // Of a normal distribution it is needed in each frame, and known.
+  const auto* normal = std::get_if<belief::NormalPose>(&object.pose);
+  const Matrix6d covariance = normal != nullptr ? normal->covariance : prior_covariance(object);
+  if (!object.held_by && is_wide(covariance)) return 0.0;
+  const double deviation = std::sqrt(covariance.diagonal().head<3>().maxCoeff());
+  const double turned = deviation > 0.0 ? 2.0 * core::normal_cdf(-kRivalTurn / deviation) : 0.0;
+  return turned > 0.0 ? std::max(std::log(turned), kSlipLogOdds) : kSlipLogOdds;
 }
 
 std::vector<Particle> particles_about(const Pose& X_WO, belief::MotionMode mode, int count,

@@ -27,8 +27,6 @@ constexpr double kFewestRivalPixels = 12;  // the tempering's pixel count is at 
 constexpr std::size_t kMostStanding = 6;   // particles from which the likeliest turn is fitted to the frame
 constexpr RefineOptions kRivalRefine = {.steps = 5, .first_gate = 0.03, .last_gate = 0.012};
 constexpr double kMostInSupport = 0.25;  // share of a rival; as of finds
-constexpr double kFoundLogOdds = -3.0;   // nats; rivals of a find that are less likely are not kept
-constexpr double kSlipLogOdds = -5.0;    // nats; prior log odds of what was followed to be turned otherwise
 constexpr double kTrackedLogOdds = 2.5;  // nats; of a frame, for a rival of what was followed
 constexpr double kFirstLogOdds = -3.5;   // nats; one frame alone makes it no likelier than this
 constexpr double kOpenLogOdds = -3.0;    // nats; a turn that is less likely was decided against: the prior counts
@@ -309,7 +307,7 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
 }
 
 void share_among_turns(std::span<const double> log_weights_before, const SymmetryGroup& symmetry,
-                       std::vector<Particle>& particles, int cameras) {
+                       std::vector<Particle>& particles, int cameras, double turned_log_odds) {
   if (symmetry.ball || log_weights_before.size() != particles.size()) return;
   std::vector<Turn> turns;
   const std::vector<std::size_t> turn_of = turns_of(particles, symmetry, turns);
@@ -325,7 +323,7 @@ void share_among_turns(std::span<const double> log_weights_before, const Symmetr
     const Turn& turn = turns[turn_of[i]];
     if (!std::isfinite(turn.log_before) || !std::isfinite(turn.log_after)) continue;
     const double frame = cameras * (turn.log_after - turn.log_before);
-    const double prior = turn.log_before < log_leading + kOpenLogOdds ? kSlipLogOdds : 0.0;
+    const double prior = turn.log_before < log_leading + kOpenLogOdds ? turned_log_odds : 0.0;
     const double shared = log_leading + (1.0 - kMemory) * (turn.log_before - log_leading) + kMemory * (prior + frame);
     particles[i].log_weight += shared - turn.log_after;
   }

@@ -8,6 +8,8 @@
 #include <numbers>
 
 #include "filter_fixture.h"
+#include "prescene/filter/operators/initialise.h"
+#include "prescene/geometry/angles.h"
 #include "prescene/geometry/symmetry.h"
 
 namespace prescene::filter_tests {
@@ -159,7 +161,7 @@ double log_odds_of_two(const std::vector<Particle>& p) {
 }
 
 /// `nats` of evidence in favour of the first turn in each of some frames.
-double after_frames(double nats, int frames) {
+double after_frames(double nats, int frames, double turned = kSlipLogOdds) {
   std::vector<Particle> particles = two_turns(0.0, 0.0);
   for (int i = 0; i < frames; ++i) {
     std::vector<double> before;
@@ -167,7 +169,7 @@ double after_frames(double nats, int frames) {
     particles[0].log_weight += nats;
     particles[1].log_weight += nats;
     belief::normalize(particles);
-    share_among_turns(before, {}, particles);
+    share_among_turns(before, {}, particles, 1, turned);
     EXPECT_NEAR(particles[0].log_weight - particles[1].log_weight, 1.0, 1e-9);
   }
   return log_odds_of_two(particles);
@@ -182,6 +184,28 @@ TEST(ShareAmongTurns, LogOddsGoToWhatAFrameSays) {
 TEST(ShareAmongTurns, WhatWasDecidedAgainstFallsFurther) {
   EXPECT_NEAR(after_frames(5.0, 400), 10.0, 1e-6);
   EXPECT_NEAR(after_frames(-5.0, 400), -10.0, 1e-6);
+}
+
+TEST(ShareAmongTurns, FramesAloneDecideWhereTheTurnWasNotKnown) {
+  EXPECT_NEAR(after_frames(5.0, 400, 0.0), 5.0, 1e-6);
+  EXPECT_NEAR(after_frames(5.0, 400, -1.5), 6.5, 1e-6);
+}
+
+TEST(TurnedLogOdds, AreThoseOfTheScenesPrior) {
+  const auto odds = [](double sd_deg) {
+    belief::SceneObject object;
+    belief::NormalPose pose;
+    pose.covariance(2, 2) = std::pow(sd_deg * geometry::kDegree, 2);
+    object.pose = pose;
+    return turned_log_odds(object);
+  };
+  EXPECT_EQ(odds(0.0), kSlipLogOdds);
+  EXPECT_EQ(odds(2.0), kSlipLogOdds);
+  EXPECT_NEAR(odds(15.0), std::log(0.31731), 1e-4);  // outside of one standard deviation
+  EXPECT_EQ(odds(40.0), 0.0);
+  belief::SceneObject held;
+  held.held_by = "hand";
+  EXPECT_EQ(turned_log_odds(held), kSlipLogOdds);
 }
 
 TEST(ShareAmongTurns, LeavesOneTurnAlone) {

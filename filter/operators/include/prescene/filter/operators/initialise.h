@@ -46,6 +46,11 @@ belief::Belief belief_from_priors(std::shared_ptr<const belief::Scene> scene, st
 /// held.
 bool has_wide_prior(const belief::SceneObject& object);
 
+/// Log of the probability, by the scene's prior alone, that the object is turned by kRivalTurn or more from where the
+/// scene says, about the axis that it is least sure of; at least kSlipLogOdds. 0 of what is looked for in the first
+/// frame, which may be found at any turn.
+double turned_log_odds(const belief::SceneObject& object);
+
 /// The supports that the frame shows and the scene does not know, each as a box of its plane's extent, the one that
 /// most pixels show first. Gravity says what is up; what is no larger than a face of the scene's models is not taken
 /// for one.

@@ -22,6 +22,11 @@ namespace prescene::filter {
 /// Poses are told apart by turns from this on: what an estimate's confidence counts as another turn.
 inline constexpr double kRivalTurn = 0.2618;  // rad, 15 degrees
 
+/// nats; prior log odds of what was followed, and began with a turn that was known, to be turned otherwise.
+inline constexpr double kSlipLogOdds = -5.0;
+/// nats; rivals of a find that are less likely are not kept.
+inline constexpr double kFoundLogOdds = -3.0;
+
 /// A pose that rivals another one.
 struct Rival {
   Pose X_WO;
@@ -57,12 +62,14 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
 /// coarse image, a mesh that is not quite right) mostly stays from frame to frame, so that many frames say no
 /// more of two turns than an average one. Their log odds go to the mean of what single frames say, with a memory of 20
 /// frames, and turns that no frame tells apart keep sharing the weight. A turn that is 3 nats or more behind the
-/// likeliest was decided against: its log odds go to 5 nats less. Where `cameras` see the object, what single frames
-/// say is summed over them: their errors are not the same.
+/// likeliest was decided against: to its log odds comes `turned_log_odds`, the prior that the object is turned
+/// otherwise than it was (turned_log_odds() in initialise.h). Of what the scene did not know the turn, frames alone
+/// decide. Where `cameras` see the object, what single frames say is summed over them: their errors are not the same.
 /// `log_weights_before`: those of the same particles before the frame. Weights within one turn are left as they are to
 /// each other, and nothing is changed where there is but one.
 void share_among_turns(std::span<const double> log_weights_before, const geometry::SymmetryGroup& symmetry,
-                       std::vector<belief::Particle>& particles, int cameras = 1);
+                       std::vector<belief::Particle>& particles, int cameras = 1,
+                       double turned_log_odds = kSlipLogOdds);
 
 /// For each particle the number of its turn, the heaviest particle's first.
 std::vector<std::size_t> turn_numbers(const std::vector<belief::Particle>& particles,
