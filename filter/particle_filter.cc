@@ -208,7 +208,7 @@ void ParticleFilter::recover_all(FrameStep& step) {
     if (is_seen && belief.step == 1 && turned_log_odds(belief.scene->objects[i]) > kFoundLogOdds)
       rival(i, RivalPrior::kFound);
     else if (is_seen && share >= kMostlySeen && (step.frame_number() + i) % kRivalsEvery == 0)
-      rival(i, RivalPrior::kTracked);
+      rival(i, turned_log_odds(belief.scene->objects[i]) < 0.0 ? RivalPrior::kTracked : RivalPrior::kFound);
     // The first frame was searched by first_look(), which asks more of a find.
     const bool is_first = belief.step == 1 && has_wide_prior(belief.scene->objects[i]);
     const bool look = !is_first && wants_recovery(settings_.augment, object, step.frame_number() + i);

@@ -47,7 +47,7 @@ std::vector<Rival> find_rivals(const FilterFrame& frame, const rendering::FrameT
 
 /// What is known of an object's turn before the frame.
 enum class RivalPrior {
-  kFound,   ///< It was found in this frame: every turn is as likely as another.
+  kFound,   ///< It was found in this frame, or its turn was never known: every turn is as likely as another.
   kTracked  ///< It was followed up to here: that it is turned otherwise is improbable (e^-5).
 };
 
