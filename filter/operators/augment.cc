@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "hidden_places.h"
+#include "particle_update.h"
 #include "prescene/filter/operators/track_state.h"
 #include "prescene/filter/operators/unknown_objects.h"
 #include "prescene/filter/proposals/fine_frame.h"
@@ -136,8 +137,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const Pose X_WO = frame.X_WC * found.X_CO;
   // A support that is a little higher than the scene says looks like the top of something inside it.
   if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > kMostOverlap) return false;
-  const double outline = outline_support(terms, depth_of(target, found.X_CO, terms.camera, *tools.renderer),
-                                         weighting.outline_step, OutlineHoles::kMayEnd);
+  const double outline = outline_at(terms, target, found.X_CO, weighting, tools);
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double reach = std::max(0.10, options.reach_speed * unseen);
   const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;

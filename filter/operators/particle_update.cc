@@ -47,6 +47,12 @@ double gate_at(double t) { return kFirstGate * std::pow(kLastGate / kFirstGate, 
 
 double limited(double length, double limit) { return length > limit ? limit / length : 1.0; }
 
+double outline_at(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
+                  const WeightOptions& options, const FilterTools& tools) {
+  return outline_support(terms, depth_of(target, X_CO, terms.camera, *tools.renderer), options.outline_step,
+                         OutlineHoles::kMayEnd);
+}
+
 double worth(double log_ratio, double outline, const WeightOptions& options) {
   return log_ratio > 0.0 ? outline_worth(outline, options) * log_ratio : log_ratio;
 }
@@ -167,8 +173,7 @@ rendering::PoseEvidence ParticleUpdate::evidence(const Pose& X_WO) const {
 
 double ParticleUpdate::outline(const Pose& X_WO) const {
   if (is_see_through(target_)) return 1.0;
-  return outline_support(terms_, depth_of(target_, X_CW_ * X_WO, terms_.camera, *tools_.renderer),
-                         options_.outline_step, OutlineHoles::kMayEnd);
+  return outline_at(terms_, target_, X_CW_ * X_WO, options_, tools_);
 }
 
 double ParticleUpdate::log_overlap(const Pose& X_WO) const {

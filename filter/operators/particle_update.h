@@ -44,6 +44,9 @@ bool is_near(const Vector6d& d, double shift, double turn);
 double gate_at(double t);
 /// The factor that brings a length down to its limit.
 double limited(double length, double limit);
+/// outline_support() at a pose of what is tracked, beside which missing pixels may be where its surface ends.
+double outline_at(const rendering::FrameTerms& terms, const SearchTarget& target, const Pose& X_CO,
+                  const WeightOptions& options, const FilterTools& tools);
 /// Evidence in favour of the pose counts as much as its outline is worth; evidence against it counts in full.
 double worth(double log_ratio, double outline, const WeightOptions& options);
 /// The share of the pixels that the pose should show that show it or something further away.

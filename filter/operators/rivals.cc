@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "particle_update.h"
 #include "prescene/filter/proposals/facets.h"
 #include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/symmetry.h"
@@ -140,13 +141,9 @@ class RivalSearch {
   /// As weight() counts it, before tempering: evidence in favour is worth less where nothing ends at the outline.
   double worth(const rendering::PoseEvidence& evidence, const Pose& X_WO) {
     if (!(evidence.log_ratio > 0.0)) return evidence.log_ratio;
-    const bool is_see_through = target_.material.behind > target_.material.hit;
     const double outline =
-        is_see_through ? 1.0
-                       : outline_support(terms_, depth_of(target_, frame_.X_CW * X_WO, terms_.camera, *tools_.renderer),
-                                         weighting_.outline_step, OutlineHoles::kMayEnd);
-    const double range = weighting_.full_outline - weighting_.min_outline;
-    return std::clamp((outline - weighting_.min_outline) / range, 0.0, 1.0) * evidence.log_ratio;
+        is_see_through(target_) ? 1.0 : outline_at(terms_, target_, frame_.X_CW * X_WO, weighting_, tools_);
+    return filter::worth(evidence.log_ratio, outline, weighting_);
   }
 
   Matrix6d covariance_at(const Pose& X_WO, double pixels, const InitialiseOptions& spread) {

@@ -120,9 +120,7 @@ void evidence_of_heaviest(const rendering::FrameTerms& terms, const SearchTarget
   const Pose X_CO = X_WC.inverse() * particles[best].X_WO;
   ParticleWeight& heaviest = report.particles[best];
   heaviest.evidence = evidence_of(terms, hypothesis(target, X_CO, tempering_pixels(terms, target, X_CO, tools)), tools);
-  if (!heaviest.hidden && !is_see_through(target))
-    heaviest.outline = outline_support(terms, depth_of(target, X_CO, terms.camera, *tools.renderer),
-                                       options.outline_step, OutlineHoles::kMayEnd);
+  if (!heaviest.hidden && !is_see_through(target)) heaviest.outline = outline_at(terms, target, X_CO, options, tools);
   report_heaviest(terms, target, X_WC, options, tools, particles, report);
 }
 
