@@ -2,9 +2,11 @@
 // What the operators of one step share.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "prescene/filter/particle_filter.h"
+#include "prescene/filter/proposals/fine_frame.h"
 
 namespace prescene::filter {
 
@@ -18,6 +20,9 @@ inline bool hides_others(const belief::ObjectBelief& object) {
          (object.state == belief::TrackState::kTracked || object.state == belief::TrackState::kDoubtful);
 }
 
+/// Share of an object's pixels that a camera shows from which its turn is looked at.
+inline constexpr double kMostlySeen = 0.5;
+
 struct ParticleFilter::FrameStep {
   const FilterFrame& frame;
   const belief::Observation& observation;
@@ -25,7 +30,8 @@ struct ParticleFilter::FrameStep {
   // By object.
   std::vector<geometry::DepthImage> depths = {};  ///< What others may be hidden by.
   std::vector<WeightReport> reports = {};
-  std::vector<Island> islands = {};  ///< Whose particles are worlds.
+  std::vector<Island> islands = {};    ///< Whose particles are worlds.
+  std::optional<FineFrame> fine = {};  ///< Made where it is asked for.
 
   belief::Belief& belief() const { return result.belief; }
   TrackedBy by() const { return {result.belief.cameras, observation.camera, observation.stamp_ns}; }

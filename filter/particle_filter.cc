@@ -26,9 +26,6 @@ constexpr double kIslandGap = 0.005;  // m; objects nearer than this form an isl
 // A support that was found in a frame is the average of what the first frames show of it, and follows later frames at
 // this rate. Chosen.
 constexpr double kLeastSupportGain = 0.1;
-// So often, in frames, and where so much of it is seen, rivals of an object that is followed are looked for.
-constexpr std::uint64_t kRivalsEvery = 5;
-constexpr double kMostlySeen = 0.5;
 constexpr double kOnePlace = 0.05;  // m
 
 /// Whether two poses differ by how the object is turned rather than by where it is.
@@ -36,13 +33,6 @@ bool is_turned_in_place(const Pose& a, const Pose& b, const SearchTarget& target
                         const geometry::SymmetryGroup& symmetry) {
   return (a * target.centre() - b * target.centre()).norm() < kOnePlace &&
          geometry::symmetric_angle(a, b, symmetry) >= kRivalTurn;
-}
-
-/// Share of the object's pixels that the frame shows; with one camera, of the newest frame that showed any.
-double share_in(const Belief& belief, std::size_t object, int camera) {
-  const ObjectBelief& seen = belief.objects[object];
-  const auto number = static_cast<std::size_t>(camera);
-  return number < seen.views.size() ? seen.views[number].visible_share : seen.visible_share;
 }
 
 /// Height of the lowest surface of a frame, against gravity from W's origin: that above which 98 % of the measured
@@ -194,21 +184,11 @@ void ParticleFilter::recover_all(FrameStep& step) {
   StepCounters& counters = step.result.counters;
   Belief& belief = step.belief();
   const core::RandomStream stream(belief.seed, core::Purpose::kRecovery);
-  const auto rival = [&](std::size_t i, RivalPrior prior) {
-    const SearchTarget target = target_in(step, i);
-    propose_rivals(frame, terms_in(step, i, target), target, model_of(belief, i).symmetry, prior, settings_.weight,
-                   settings_.initialise, tools_, belief.objects[i]);
-  };
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     ObjectBelief& object = belief.objects[i];
     const bool is_believed = object.state == TrackState::kTracked || object.state == TrackState::kDoubtful;
     if (is_believed && !step.shows(i)) continue;  // another camera sees it
-    const double share = share_in(belief, i, step.observation.camera);
-    const bool is_seen = is_believed && share >= settings_.weight.hidden_share;
-    if (is_seen && belief.step == 1 && turned_log_odds(belief.scene->objects[i]) > kFoundLogOdds)
-      rival(i, RivalPrior::kFound);
-    else if (is_seen && share >= kMostlySeen && (step.frame_number() + i) % kRivalsEvery == 0)
-      rival(i, turned_log_odds(belief.scene->objects[i]) < 0.0 ? RivalPrior::kTracked : RivalPrior::kFound);
+    if (is_believed) weigh_turns(step, i);
     // The first frame was searched by first_look(), which asks more of a find.
     const bool is_first = belief.step == 1 && has_wide_prior(belief.scene->objects[i]);
     const bool look = !is_first && wants_recovery(settings_.augment, object, step.frame_number() + i);
@@ -244,7 +224,7 @@ void ParticleFilter::recover_all(FrameStep& step) {
     object.frames_unseen = 0;
     object.frames_refuted = 0;
     mark_found(step.by(), object);
-    rival(i, RivalPrior::kFound);
+    look_at_turns_of(step, i, RivalPrior::kFound, 1.0);
     weigh_print_of(step, i, true);
     step.depths[i] = depth_in(step, i);
   }
@@ -352,6 +332,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
 
   FilterFrame frame;
   frame_caches_.resize(static_cast<std::size_t>(belief::camera_count(*belief.scene)));
+  smears_.resize(frame_caches_.size());
   result.frame_status =
       prepare_frame(belief.scene, observation, X_WG,
                     {settings_.colors, learned_models(belief, settings_.frame.colors, observation.camera)},

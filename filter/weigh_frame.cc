@@ -55,9 +55,11 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
                   stream.at(belief.step, static_cast<std::uint32_t>(object)), seen.particles, context);
   if (report.all_impossible) step.result.degraded |= kImpossibleWeights;
   // What is hidden is not distinguished by its turn.
-  if (report.hidden_weight < 0.5 && report.visible_share >= settings_.weight.hidden_share)
+  if (report.hidden_weight < 0.5 && report.visible_share >= settings_.weight.hidden_share) {
+    const bool is_looked_at = is_sharp(step.observation.camera) && report.visible_share >= kMostlySeen;
     share_among_turns(before, model_of(belief, object).symmetry, seen.particles, seeing_cameras(step.by(), seen),
-                      turned_log_odds(belief.scene->objects[object]));
+                      turned_log_odds(belief.scene->objects[object]), is_looked_at ? 0.0 : kTurnMemory);
+  }
   for (const ParticleWeight& particle : report.particles) step.result.counters.hidden_particles += particle.hidden;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "prescene/filter/operators/predict.h"
+#include "prescene/filter/operators/rivals.h"
 #include "prescene/geometry/symmetry.h"
 
 namespace prescene::filter {
@@ -19,16 +20,12 @@ using geometry::Vector6d;
 /// Share of a new frame in the mean pose of what lies still, at least: supports and cameras may drift.
 constexpr double kLeastGain = 0.02;
 
-constexpr int kRestFrames = 10;  // an object that is tracked for so many frames without moving lies still; chosen
-// It moves when it is further from where it lay than this, or turned further, and in either case by at least three of
-// its standard deviations. Chosen.
-constexpr double kStartShift = 0.008;  // m
-constexpr double kStartTurn = 0.09;    // rad
-constexpr double kBefore = 0.4;        // s; an episode begins so long before motion was noticed
-constexpr double kLongest = 2.0;       // s; what lasts longer is judged by its beginning
-constexpr double kLongestGap = 0.3;    // s; an episode in which the object is not tracked for longer is given up
-constexpr int kFewestSamples = 5;      // of an episode
-constexpr double kRestTime = 0.5;      // s; what lies still is simulated for so long
+constexpr int kRestFrames = 10;      // an object that is tracked for so many frames without moving lies still; chosen
+constexpr double kBefore = 0.4;      // s; an episode begins so long before motion was noticed
+constexpr double kLongest = 2.0;     // s; what lasts longer is judged by its beginning
+constexpr double kLongestGap = 0.3;  // s; an episode in which the object is not tracked for longer is given up
+constexpr int kFewestSamples = 5;    // of an episode
+constexpr double kRestTime = 0.5;    // s; what lies still is simulated for so long
 
 double seconds_between(core::TimeNs from, core::TimeNs to) { return 1e-9 * static_cast<double>(to - from); }
 
@@ -127,6 +124,14 @@ std::vector<belief::KinematicBody::Waypoint> with_corners(const std::vector<beli
   return path;
 }
 
+void note_known_better(const Pose& X_WO, MotionRecord& record) {
+  if (record.still_frames == 0) return;
+  if (record.episode && !record.episode->closed) record.episode.reset();
+  const bool place_judged = record.place_judged;
+  begin_anew(X_WO, record);
+  record.place_judged = place_judged;
+}
+
 void follow_motion(const belief::Belief& belief, int object, MotionRecord& record) {
   const belief::ObjectBelief& mine = belief.objects[static_cast<std::size_t>(object)];
   const bool judging = record.episode && record.episode->closed;
@@ -163,6 +168,13 @@ void follow_motion(const belief::Belief& belief, int object, MotionRecord& recor
   const belief::ObjectModel& model = belief::model_of(belief, mine);
   now.X_WO = geometry::closest_equivalent(now.X_WO, record.X_still, model.symmetry);
   const Vector6d moved = geometry::box_minus(now.X_WO, record.X_still);
+  // What rests and is believed to be turned otherwise from one frame to the next has not moved: it is known better.
+  if (estimate.motion == belief::MotionMode::kResting && !record.recent.empty() &&
+      geometry::symmetric_angle(now.X_WO, record.recent.back().X_WO, model.symmetry) >= kRivalTurn) {
+    note_known_better(now.X_WO, record);
+    keep_recent(now, record);
+    return;
+  }
   const bool moves = moved.tail<3>().norm() > std::max(kStartShift, 3.0 * now.deviation.tail<3>().maxCoeff()) ||
                      moved.head<3>().norm() > std::max(kStartTurn, 3.0 * now.deviation.head<3>().maxCoeff());
   record.moved_frames = moves ? record.moved_frames + 1 : 0;

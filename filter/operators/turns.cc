@@ -14,7 +14,6 @@ namespace {
 using belief::Particle;
 using geometry::SymmetryGroup;
 
-constexpr double kMemory = 0.05;       // weight of the newest frame: twenty frames count
 constexpr double kOpenLogOdds = -3.0;  // nats; a turn that is less likely was decided against: the prior counts
 
 }  // namespace
@@ -37,7 +36,7 @@ std::vector<std::size_t> turns_of(const std::vector<Particle>& particles, const 
 }
 
 void share_among_turns(std::span<const double> log_weights_before, const SymmetryGroup& symmetry,
-                       std::vector<Particle>& particles, int cameras, double turned_log_odds) {
+                       std::vector<Particle>& particles, int cameras, double turned_log_odds, double memory) {
   if (symmetry.ball || log_weights_before.size() != particles.size()) return;
   std::vector<Turn> turns;
   const std::vector<std::size_t> turn_of = turns_of(particles, symmetry, turns);
@@ -54,10 +53,19 @@ void share_among_turns(std::span<const double> log_weights_before, const Symmetr
     if (!std::isfinite(turn.log_before) || !std::isfinite(turn.log_after)) continue;
     const double frame = cameras * (turn.log_after - turn.log_before);
     const double prior = turn.log_before < log_leading + kOpenLogOdds ? turned_log_odds : 0.0;
-    const double shared = log_leading + (1.0 - kMemory) * (turn.log_before - log_leading) + kMemory * (prior + frame);
+    const double shared = log_leading + (1.0 - memory) * (turn.log_before - log_leading) + memory * (prior + frame);
     particles[i].log_weight += shared - turn.log_after;
   }
   belief::normalize(particles);
+}
+
+bool holds_turns(const std::vector<Particle>& particles, const SymmetryGroup& symmetry) {
+  if (symmetry.ball || particles.empty()) return false;
+  const Particle& best = belief::heaviest(particles);
+  double others = -std::numeric_limits<double>::infinity();
+  for (const Particle& particle : particles)
+    if (is_apart(particle.X_WO, best.X_WO, symmetry)) others = log_sum(others, particle.log_weight);
+  return others > kSlipLogOdds;
 }
 
 std::vector<std::size_t> turn_numbers(const std::vector<Particle>& particles, const SymmetryGroup& symmetry) {

@@ -91,8 +91,14 @@ FineFrame sampled_fine(const FilterFrame& frame, const belief::Scene& scene, con
 
 FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const belief::Observation& observation,
                      const FilterTools& tools) {
+  return fine_frame(frame, scene, observation, tools,
+                    measure_edge_smear(*observation.frame.depth, observation.frame.color.get()));
+}
+
+FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const belief::Observation& observation,
+                     const FilterTools& tools, const EdgeSmear& smear) {
   FineFrame fine = sampled_fine(frame, scene, observation, tools);
-  fine.smear = measure_edge_smear(*observation.frame.depth, observation.frame.color.get());
+  fine.smear = smear;
   return fine;
 }
 

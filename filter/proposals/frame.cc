@@ -144,6 +144,12 @@ SearchTarget target_of(const belief::ObjectBelief& object, const belief::Scene& 
   return target;
 }
 
+SearchTarget in_fine(SearchTarget target, const belief::ObjectModel& model, const FilterTools& tools) {
+  target.mesh = tools.meshes->get(model.visual, model.collision, MeshDetail::kFine);
+  target.facet_lever = tools.meshes->facet_lever(*target.mesh);
+  return target;
+}
+
 geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,
                               rendering::Renderer& renderer) {
   rendering::RenderScene scene;

@@ -11,6 +11,8 @@
 namespace prescene::filter {
 namespace {
 
+constexpr int kFineTriangles = 5;  // times as many as for likelihoods
+
 geometry::Rgb rgb_of(const belief::Color& color) {
   const auto channel = [](double value) {
     return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(value, 0.0, 1.0)));
@@ -53,9 +55,9 @@ rendering::MeshHandle MeshCache::get(const belief::MeshPtr& mesh, MeshDetail det
   entry.source = mesh;
   rendering::MeshHandle& handle = by_content_[{geometry::content_hash(*mesh), detail}];
   if (!handle) {
-    handle = detail == MeshDetail::kDisplay
-                 ? rendering::make_render_mesh(*mesh)
-                 : rendering::make_render_mesh(geometry::simplified(*mesh, likelihood_triangles_));
+    const int triangles = (detail == MeshDetail::kFine ? kFineTriangles : 1) * likelihood_triangles_;
+    handle = detail == MeshDetail::kDisplay ? rendering::make_render_mesh(*mesh)
+                                            : rendering::make_render_mesh(geometry::simplified(*mesh, triangles));
   }
   entry.mesh = handle;
   return handle;

@@ -24,6 +24,7 @@
 #include "prescene/filter/operators/world_terms.h"
 #include "prescene/filter/operators/worlds.h"
 #include "prescene/filter/proposals/detection.h"
+#include "prescene/filter/proposals/fine_frame.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/filter/proposals/segmentation.h"
 #include "prescene/filter/proposals/support_tracking.h"
@@ -83,6 +84,13 @@ extern const std::vector<double> log_weights_before;
 extern const WeightOptions weighting;
 extern const InitialiseOptions spread;
 }  // namespace rivals_h
+
+namespace turn_looks_h {
+extern const SearchTarget fine_target;
+extern const geometry::SymmetryGroup symmetry;
+extern const WeightOptions weighting;
+extern const InitialiseOptions spread;
+}  // namespace turn_looks_h
 
 namespace unknown_objects_h {
 extern const AugmentOptions options;

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "filter_fixture.h"
+#include "mug_with_handle.h"
 #include "prescene/filter/operators/initialise.h"
 #include "prescene/geometry/angles.h"
 #include "prescene/geometry/symmetry.h"
@@ -22,26 +23,6 @@ using geometry::SymmetryGroup;
 
 constexpr double kRightShift = 0.02;  // m
 constexpr double kRightTurn = 0.2618;
-
-belief::ObjectModel mug_with_handle() {
-  belief::ObjectModel mug;
-  mug.name = "mug";
-  mug.collision.push_back(belief::PrimitiveShape{geometry::Cylinder{0.038, 0.095}, Pose::identity()});
-  mug.collision.push_back(
-      belief::PrimitiveShape{geometry::BoxShape{{0.03, 0.012, 0.06}}, Pose::from_translation({0.051, 0.0, 0.0})});
-  mug.mass = belief::FixedScalar{0.3};
-  mug.symmetry = SymmetryGroup::cyclic(Vector3d::UnitX(), 2);  // about its handle
-  return *belief::with_derived_properties(mug);
-}
-
-/// On the table, its handle turned by `angle` from W's x axis.
-Pose mug_pose(double angle) { return {geometry::exp_rotation({0.0, 0.0, angle}), {0.02, -0.03, 0.0475}}; }
-
-/// The angle at which the handle points away from the camera.
-double angle_behind() {
-  const Vector3d away = mug_pose(0.0).translation - test_camera_pose().translation;
-  return std::atan2(away.y(), away.x());
-}
 
 struct TurnRun {
   int frames = 0;

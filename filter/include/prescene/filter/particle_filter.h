@@ -31,11 +31,13 @@
 #include "prescene/filter/operators/learn_physics.h"
 #include "prescene/filter/operators/predict.h"
 #include "prescene/filter/operators/resample.h"
+#include "prescene/filter/operators/rivals.h"
 #include "prescene/filter/operators/track_state.h"
 #include "prescene/filter/operators/watched_renderer.h"
 #include "prescene/filter/operators/weigh_print.h"
 #include "prescene/filter/operators/weight.h"
 #include "prescene/filter/operators/worlds.h"
+#include "prescene/filter/proposals/edge_smear.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/filter/proposals/support_tracking.h"
 
@@ -162,6 +164,8 @@ class ParticleFilter {
   void resample_all(FrameStep& step);
   void weigh_print_of(FrameStep& step, std::size_t object, bool found);
   void recover_all(FrameStep& step);
+  void weigh_turns(FrameStep& step, std::size_t object);
+  void look_at_turns_of(FrameStep& step, std::size_t object, RivalPrior prior, double gain);
   void exchange_all(FrameStep& step);
   void look_for_more(FrameStep& step);
   SearchTarget target_in(const FrameStep& step, std::size_t object) const;
@@ -176,6 +180,9 @@ class ParticleFilter {
   WatchedRenderer renderer_;
   FilterTools tools_;
   std::vector<FrameCache> frame_caches_;  // by camera
+  /// Whether the camera was sharp when that was last measured, so that turns are looked at in its fine image.
+  bool is_sharp(int camera) const { return smears_[static_cast<std::size_t>(camera)].is_sharp(); }
+  std::vector<EdgeSmear> smears_;  // by camera, as last measured
   PrintCache prints_;
   TouchTest touch_;
   bool traces_stages_ = false;

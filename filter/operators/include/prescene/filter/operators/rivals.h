@@ -27,6 +27,9 @@ inline constexpr double kSlipLogOdds = -5.0;
 /// nats; rivals of a find that are less likely are not kept.
 inline constexpr double kFoundLogOdds = -3.0;
 
+/// Weight of the newest frame in what frames say of turns: twenty frames count.
+inline constexpr double kTurnMemory = 0.05;
+
 /// A pose that rivals another one.
 struct Rival {
   Pose X_WO;
@@ -68,8 +71,11 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
 /// `log_weights_before`: those of the same particles before the frame. Weights within one turn are left as they are to
 /// each other, and nothing is changed where there is but one.
 void share_among_turns(std::span<const double> log_weights_before, const geometry::SymmetryGroup& symmetry,
-                       std::vector<belief::Particle>& particles, int cameras = 1,
-                       double turned_log_odds = kSlipLogOdds);
+                       std::vector<belief::Particle>& particles, int cameras = 1, double turned_log_odds = kSlipLogOdds,
+                       double memory = kTurnMemory);
+
+/// Whether particles of another turn than the heaviest one's have more than e^-5 of the weight.
+bool holds_turns(const std::vector<belief::Particle>& particles, const geometry::SymmetryGroup& symmetry);
 
 /// For each particle the number of its turn, the heaviest particle's first.
 std::vector<std::size_t> turn_numbers(const std::vector<belief::Particle>& particles,

@@ -29,6 +29,9 @@ struct FineFrame {
 /// `scene` and `observation` are those that the frame was prepared with.
 FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const belief::Observation& observation,
                      const FilterTools& tools);
+/// The same of a camera whose smear is known: measuring it takes as long as the rest.
+FineFrame fine_frame(const FilterFrame& frame, const belief::Scene& scene, const belief::Observation& observation,
+                     const FilterTools& tools, const EdgeSmear& smear);
 /// The same where the camera is sharp; else its smear alone, without terms, since finds are not judged in them.
 FineFrame fine_frame_if_sharp(const FilterFrame& frame, const belief::Scene& scene,
                               const belief::Observation& observation, const FilterTools& tools);

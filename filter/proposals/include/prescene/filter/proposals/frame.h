@@ -89,6 +89,8 @@ SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& fram
 /// The same of an object of the scene, with its own colours if the frame has them.
 SearchTarget target_of(const belief::ObjectBelief& object, const belief::Scene& scene, const FilterFrame& frame,
                        const FilterTools& tools);
+/// A target of the model as fine images show it (MeshDetail::kFine).
+SearchTarget in_fine(SearchTarget target, const belief::ObjectModel& model, const FilterTools& tools);
 
 /// Depth of one object in the frame's reduced camera, 0 where it is not.
 geometry::DepthImage depth_of(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,

@@ -26,13 +26,14 @@ struct RestingShape;  // prescene/filter/proposals/resting_starts.h
 /// How fine a mesh is drawn.
 enum class MeshDetail {
   kLikelihood,  ///< Simplified: finer meshes gave no better pose on real frames.
+  kFine,        ///< For images whose pixels are 3 to 4 mm wide at 1 m: there the simplified one is not exact enough.
   kDisplay,     ///< As it is.
 };
 
 /// Meshes as renderers want them, made on first use and kept. Safe to call from several threads.
 class MeshCache {
  public:
-  /// Meshes for likelihoods have at most so many triangles (>= 4).
+  /// Meshes for likelihoods have at most so many triangles (>= 4), those for fine images five times as many.
   explicit MeshCache(int likelihood_triangles = 400) : likelihood_triangles_(likelihood_triangles) {}
 
   /// Never null. The cache keeps `mesh` alive, so that its address stays its name.
