@@ -76,6 +76,7 @@ std::string values_text(const Json& values) {
 }
 
 std::string probability_text(const Json& choice) {
+  if (choice.value("instances", std::size_t{0}) == 0) return "P not known: no fresh instance was run";
   return "P " + core::fixed_text(choice.value("probability", 0.0), 3) + " (" +
          core::fixed_text(choice.at("interval").at(0).get<double>(), 3) + " to " +
          core::fixed_text(choice.at("interval").at(1).get<double>(), 3) + "), " +

@@ -51,7 +51,7 @@ std::string nothing_came_text(const InputTopics& topics, std::span<const DomainT
   });
   if (offered != there.end() && is_image_type(offered->type))
     return text + ": the topic is there (" + short_type(offered->type) +
-           "), but no message of it came that could be used; start what publishes it, or name another topic " +
+           "), but no message that can be used has come yet; start what publishes it, or name another topic " +
            (camera.empty() ? "with --depth-topic" : "under the camera's 'topics' in the scene file");
   if (offered != there.end()) text += ", which is offered as " + offered->type;
   const std::vector<DomainTopic> images = image_topics(there);

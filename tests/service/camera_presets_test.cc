@@ -42,7 +42,7 @@ TEST(NothingCame, SaysWhatIsThere) {
   EXPECT_THAT(nothing_came_text(topics, there, "here"), HasSubstr("--camera zed has these names"));
   there.push_back({topics.depth, "sensor_msgs/msg/Image", 1, 0});
   EXPECT_THAT(nothing_came_text(topics, there, "here"),
-              testing::AllOf(HasSubstr(topics.depth + ": the topic is there (Image), but no message of it came"),
+              testing::AllOf(HasSubstr(topics.depth + ": the topic is there (Image), but no message that can be used"),
                              testing::Not(HasSubstr("name the camera's"))));
   there.back().type = "std_msgs/msg/String";
   EXPECT_THAT(nothing_came_text(topics, there, "here"), HasSubstr("which is offered as std_msgs/msg/String"));

@@ -21,7 +21,7 @@ struct ScalarRange {
   bool hard_high = false;
 };
 
-inline constexpr ScalarRange kMassRange{1e-9, 1e6, "give a mass in kg, more than 0 and at most 1e6", true};
+inline constexpr ScalarRange kMassRange{1e-9, 1e6, "give a mass in kg, from 1e-9 to 1e6", true};
 inline constexpr ScalarRange kLengthRange{-1e4, 1e4, "give metres between -1e4 and 1e4"};
 inline constexpr ScalarRange kSpeedRange{-1e4, 1e4, "give m/s or rad/s between -1e4 and 1e4"};
 inline constexpr ScalarRange kFrictionRange{
