@@ -25,7 +25,7 @@
 
 namespace prescene::simulation {
 
-/// When an instance stops.
+/// When an instance stops. How many are run: outcome_estimator.h in simulation/outcomes.
 struct StopRule {
   double duration = 5.0;       ///< s, at most
   bool stop_at_rest = true;    ///< Stop when everything is at rest: see RestRule.

@@ -130,8 +130,7 @@ struct AbsentMixture {
   double peak_depth = 0.0;  ///< m
   double peak_sigma = 0.0;  ///< m
   double peak_weight = 0.0;
-  /// Probability of no return; negative = not known, then a missing return says only how the material differs from an
-  /// opaque one.
+  /// Probability of no return; negative = not known, then a missing return says nothing.
   double missing = -1.0;
 };
 
