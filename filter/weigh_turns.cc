@@ -68,14 +68,15 @@ void ParticleFilter::look_at_turns_of(FrameStep& step, std::size_t object, Rival
   };
   const bool is_known = prior == RivalPrior::kTracked && !(turned_log_odds(named) > kSlipLogOdds);
   // A turn that was known and is held alone is only questioned where the coarse image speaks for another one.
-  if (is_known && !holds_turns(seen.particles, model.symmetry) && propose() == 0) return;
+  const bool is_in_question = !is_known || holds_turns(seen.particles, model.symmetry);
+  if (!is_in_question && propose() == 0) return;
   EdgeSmear& smear = smears_[static_cast<std::size_t>(step.observation.camera)];
   if (!step.fine && smear.is_sharp() && step.frame_number() % kSmearEvery != 0)
     step.fine = fine_frame(frame, *belief.scene, step.observation, tools_, smear);
   if (!step.fine) step.fine = fine_frame_if_sharp(frame, *belief.scene, step.observation, tools_);
   smear = step.fine->smear;
   if (!step.fine->smear.is_sharp()) {
-    if (!is_known) propose();
+    if (is_in_question) propose();
     return;
   }
   rendering::FrameTerms fine_terms = step.fine->terms;
