@@ -18,8 +18,9 @@ namespace {
 using geometry::Matrix3d;
 using geometry::SymmetryGroup;
 
-constexpr int kTurnSteps = 24;       // in a full turn
-constexpr double kSameAxis = 0.996;  // cosine; about 5 degrees
+constexpr int kTurnSteps = 24;            // in a full turn
+constexpr double kSameAxis = 0.996;       // cosine; about 5 degrees
+constexpr std::size_t kPosesInBlock = 4;  // of a thread; results do not depend on it
 
 /// The principal axes of a mesh's surface, in its frame; empty where it has no area.
 std::vector<Vector3d> principal_axes(const rendering::RenderMesh& mesh) {
@@ -121,21 +122,29 @@ RivalSearch::RivalSearch(const FilterFrame& frame, const rendering::FrameTerms& 
       target_(target),
       weighting_(weighting),
       tools_(tools),
-      workspace_(tools.search->workspaces()) {}
+      in_block_(std::max(kPosesInBlock, tools.search->batch().info().good_call)) {}
 
 std::vector<rendering::PoseEvidence> RivalSearch::evaluate(std::span<const Pose> X_WO) {
   std::vector<rendering::PoseHypothesis> hypotheses;
   hypotheses.reserve(X_WO.size());
   for (const Pose& pose : X_WO) hypotheses.push_back(hypothesis(target_, frame_.X_CW * pose));
   std::vector<rendering::PoseEvidence> evidence(hypotheses.size());
-  tools_.search->batch().evaluate(terms_, hypotheses, *workspace_, evidence);
+  tools_.search->threads().for_blocks(X_WO.size(), in_block_, [&](std::size_t begin, std::size_t end) {
+    const rendering::WorkspacePool::Loan workspace(tools_.search->workspaces());
+    tools_.search->batch().evaluate(terms_, std::span(hypotheses).subspan(begin, end - begin), *workspace,
+                                    std::span(evidence).subspan(begin, end - begin));
+  });
   return evidence;
 }
 
 void RivalSearch::refine(const RefineOptions& options, std::span<Pose> X_WO) {
-  for (Pose& pose : X_WO) pose = frame_.X_CW * pose;
-  tools_.search->refine(terms_, target_, options, *workspace_, X_WO);
-  for (Pose& pose : X_WO) pose = geometry::normalized(frame_.X_WC * pose);
+  tools_.search->threads().for_blocks(X_WO.size(), in_block_, [&](std::size_t begin, std::size_t end) {
+    const rendering::WorkspacePool::Loan workspace(tools_.search->workspaces());
+    const std::span<Pose> poses = X_WO.subspan(begin, end - begin);
+    for (Pose& pose : poses) pose = frame_.X_CW * pose;
+    tools_.search->refine(terms_, target_, options, *workspace, poses);
+    for (Pose& pose : poses) pose = geometry::normalized(frame_.X_WC * pose);
+  });
 }
 
 double RivalSearch::worth(const rendering::PoseEvidence& evidence, const Pose& X_WO) {
@@ -148,7 +157,8 @@ double RivalSearch::worth(const rendering::PoseEvidence& evidence, const Pose& X
 Matrix6d RivalSearch::covariance_at(const Pose& X_WO, double pixels, const InitialiseOptions& spread) {
   const rendering::PoseHypothesis h = hypothesis(target_, frame_.X_CW * X_WO, pixels);
   rendering::PoseLinearisation residuals;
-  tools_.search->batch().linearise(terms_, std::span(&h, 1), {}, *workspace_, std::span(&residuals, 1));
+  const rendering::WorkspacePool::Loan workspace(tools_.search->workspaces());
+  tools_.search->batch().linearise(terms_, std::span(&h, 1), {}, *workspace, std::span(&residuals, 1));
   Matrix6d H = rendering::tempering(terms_.tempering.information, pixels, terms_.step) * residuals.H;
   Vector6d unused = Vector6d::Zero();
   without_facets(target_.facet_lever, h.X_CO.rotation, target_.centre(), H, unused);

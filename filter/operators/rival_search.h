@@ -28,7 +28,7 @@ std::vector<Pose> turned_poses(const Pose& X_WO, const SearchTarget& target, con
 void add_apart(std::span<const Pose> X_WO, std::span<const rendering::PoseEvidence> evidence,
                const geometry::SymmetryGroup& symmetry, std::size_t most, std::vector<Pose>& chosen);
 
-/// What one image says of poses of a target. All that is given outlives it.
+/// What one image says of poses of a target, on all threads of the tools. All that is given outlives it.
 class RivalSearch {
  public:
   RivalSearch(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
@@ -48,7 +48,7 @@ class RivalSearch {
   const SearchTarget& target_;
   const WeightOptions& weighting_;
   const FilterTools& tools_;
-  rendering::WorkspacePool::Loan workspace_;
+  std::size_t in_block_;
 };
 
 }  // namespace prescene::filter
