@@ -74,11 +74,19 @@ struct TrackedMotion {
   belief::Pose last;                                           ///< Where it was tracked last.
 };
 
+/// By what an object is off a simulated instance, both about W's axes and at the origin of O.
+struct StateError {
+  geometry::Vector6d pose = geometry::Vector6d::Zero();   ///< Turn (rad) and shift (m).
+  geometry::Vector6d twist = geometry::Vector6d::Zero();  ///< Of the velocities: rad/s and m/s.
+};
+
 /// Coordinates that pushes and blows have in common, the first ones: time, direction, height and side of the touch.
 inline constexpr std::size_t kTouchDimensions = 4;
 inline constexpr double kEventInterval = 1.0 / 60.0;  ///< s between the states of simulated instances.
 /// Between the states of a run; before the first and after the last, these.
 belief::Pose pose_in(const belief::Trajectory& run, std::size_t object, double time);
+/// The kept state of a run before a time.
+belief::WorldState state_in(const belief::Trajectory& run, double time);
 /// W's x, laid flat: what directions count from.
 geometry::Vector3d horizontal_x(const geometry::Vector3d& up);
 
@@ -144,6 +152,11 @@ class EventPaths {
                 std::span<EventDraw> draws = {}, std::span<belief::Trajectory> runs = {},
                 std::span<const geometry::Vector3d> moved = {});
 
+  /// Instances of simulate() once more from a time after their events on, with the hypothesis' object off by `errors`:
+  /// poses of all that the paths move, in frames after that time. `runs`: as simulate() gave them.
+  void go_on(const Hypothesis& hypothesis, double time, std::span<const EventDraw> draws,
+             std::span<const StateError> errors, std::span<const belief::Trajectory> runs, std::span<ScenePath> paths);
+
   int simulated() const { return simulated_; }
   int failed() const { return failed_; }
   /// The first error of a simulator that was to be made; what was simulated is worth nothing then.
@@ -173,6 +186,7 @@ class EventPaths {
                                       std::optional<std::size_t> moved = {});
   std::vector<belief::Action> actions_from(double time) const;
   bool touch(std::size_t object, const belief::WorldState& state, EventDraw& draw) const;
+  belief::Push push_of(const EventDraw& draw) const;
   void begin_event(const Hypothesis& hypothesis, belief::WorldState& state, EventDraw& draw,
                    std::vector<belief::Action>& actions, bool* possible) const;
   std::vector<belief::Action> let_go_at(std::size_t object, const belief::Pose& X_WO, const EventDraw& draw) const;

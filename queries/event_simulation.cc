@@ -25,7 +25,19 @@ constexpr double kPusherGap = 1e-3;                  // m between what pushes an
 constexpr double kCarried = 1e-3, kLetGo = 0.02;
 constexpr double kOpening = 1e-3;  // m by which the hand then rises: simulators count it as done with after that only
 
-/// The state of a run at a time: the kept one before it.
+bool is_simulated(EventKind kind) {
+  return kind == EventKind::kPushed || kind == EventKind::kBumped || kind == EventKind::kSlipped;
+}
+
+bool differs(const std::optional<Pose>& a, const std::optional<Pose>& b) {
+  if (a.has_value() != b.has_value()) return true;
+  if (!a) return false;
+  return (a->translation - b->translation).norm() > kMovedPlace ||
+         geometry::angle_between(a->rotation, b->rotation) > kMovedTurn;
+}
+
+}  // namespace
+
 belief::WorldState state_in(const belief::Trajectory& run, double time) {
   const auto later = std::upper_bound(run.states.begin(), run.states.end(), time + 1e-9,
                                       [](double t, const belief::WorldState& state) { return t < state.time; });
@@ -44,19 +56,6 @@ belief::WorldState state_in(const belief::Trajectory& run, double time) {
   state.time = std::max(state.time, time - kEventInterval);
   return state;
 }
-
-bool is_simulated(EventKind kind) {
-  return kind == EventKind::kPushed || kind == EventKind::kBumped || kind == EventKind::kSlipped;
-}
-
-bool differs(const std::optional<Pose>& a, const std::optional<Pose>& b) {
-  if (a.has_value() != b.has_value()) return true;
-  if (!a) return false;
-  return (a->translation - b->translation).norm() > kMovedPlace ||
-         geometry::angle_between(a->rotation, b->rotation) > kMovedTurn;
-}
-
-}  // namespace
 
 Pose pose_in(const belief::Trajectory& run, std::size_t object, double time) {
   const auto later = std::lower_bound(run.states.begin(), run.states.end(), time,
@@ -111,6 +110,18 @@ bool EventPaths::touch(std::size_t object, const belief::WorldState& state, Even
   return nearest < 1e300;
 }
 
+belief::Push EventPaths::push_of(const EventDraw& draw) const {
+  const Vector3d up = belief::up_of(*scene_);
+  const Vector3d x = horizontal_x(up);
+  const Vector3d along = std::cos(draw.direction) * x + std::sin(draw.direction) * up.cross(x);
+  belief::Push push;
+  push.radius = priors_.pusher_radius;
+  push.from = draw.touched_W - (push.radius + kPusherGap) * along;
+  push.to = push.from + draw.speed * draw.duration * along;
+  push.duration = draw.duration;
+  return push;
+}
+
 void EventPaths::begin_event(const Hypothesis& hypothesis, belief::WorldState& state, EventDraw& draw,
                              std::vector<belief::Action>& actions, bool* possible) const {
   belief::ObjectState& object = state.objects[hypothesis.object];
@@ -124,18 +135,13 @@ void EventPaths::begin_event(const Hypothesis& hypothesis, belief::WorldState& s
   }
   const bool free = object.mode != belief::MotionMode::kHeld;
   *possible = free && touch(hypothesis.object, state, draw);
+  if (hypothesis.kind == EventKind::kPushed) {
+    actions.push_back({0.0, push_of(draw)});
+    return;
+  }
   const Vector3d up = belief::up_of(*scene_);
   const Vector3d x = horizontal_x(up);
   const Vector3d along = std::cos(draw.direction) * x + std::sin(draw.direction) * up.cross(x);
-  if (hypothesis.kind == EventKind::kPushed) {
-    belief::Push push;
-    push.radius = priors_.pusher_radius;
-    push.from = draw.touched_W - (push.radius + kPusherGap) * along;
-    push.to = push.from + draw.speed * draw.duration * along;
-    push.duration = draw.duration;
-    actions.push_back({0.0, push});
-    return;
-  }
   object.mode = belief::MotionMode::kMoving;
   const belief::ObjectModel& moved = model(hypothesis.object);
   const geometry::Matrix3d R = object.X_WO.rotation.toRotationMatrix();
@@ -346,6 +352,33 @@ void EventPaths::simulate(const Hypothesis& hypothesis, std::span<const LatentPo
     if (!runs_out.empty() && is_simulated(hypothesis.kind)) runs_out[i] = std::move(after[i]);
     if (!runs_out.empty() && hypothesis.kind == EventKind::kNothing) runs_out[i] = std::move(before[i]);
   }
+}
+
+void EventPaths::go_on(const Hypothesis& hypothesis, double time, std::span<const EventDraw> draws,
+                       std::span<const StateError> errors, std::span<const belief::Trajectory> runs,
+                       std::span<ScenePath> paths) {
+  const std::size_t n = runs.size();
+  std::vector<belief::WorldState> states(n);
+  std::vector<std::vector<belief::Action>> actions(n);
+  bool alone = still_;
+  for (std::size_t i = 0; i < n; ++i) {
+    states[i] = state_in(runs[i], time);
+    belief::ObjectState& object = states[i].objects[hypothesis.object];
+    object.X_WO.rotation = (geometry::exp_rotation(errors[i].pose.head<3>()) * object.X_WO.rotation).normalized();
+    object.X_WO.translation += errors[i].pose.tail<3>();
+    object.V_WO.angular += errors[i].twist.head<3>();
+    object.V_WO.linear += errors[i].twist.tail<3>();
+    actions[i] = actions_from(states[i].time);
+    if (hypothesis.kind == EventKind::kPushed)
+      actions[i].push_back({draws[i].time - states[i].time, push_of(draws[i])});
+    alone = alone && paths[i].moved.size() == 1;
+  }
+  const auto after = run(states, actions, alone ? std::optional(hypothesis.object) : std::nullopt);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t m = 0; m < paths[i].moved.size(); ++m)
+      for (std::size_t k = 0; k < times_.size(); ++k)
+        if (times_[k] > time && paths[i].paths[m][k])
+          paths[i].paths[m][k] = pose_in(after[i], paths[i].moved[m], times_[k]);
 }
 
 }  // namespace prescene::queries

@@ -7,6 +7,7 @@
 
 #include "explain_text.h"
 #include "prescene/geometry/dense_solvers.h"
+#include "unseen_ends.h"
 
 namespace prescene::queries {
 namespace {
@@ -33,6 +34,20 @@ struct PossiblePlace {
   geometry::Vector3d mean;
   geometry::Matrix3d covariance;
   double weight;
+};
+
+/// Where an object may be, and whether it is there at all.
+struct PossiblePlaces {
+  std::vector<PossiblePlace> there;
+  double gone = 0.0, all = 0.0;  // weights
+
+  void add(const std::optional<Pose>& X_WO, double weight,
+           const geometry::Matrix3d& covariance = geometry::Matrix3d::Zero(),
+           const geometry::Vector3d& off = geometry::Vector3d::Zero()) {
+    all += weight;
+    if (!X_WO) gone += weight;
+    if (X_WO) there.push_back({X_WO->translation + off, covariance, weight});
+  }
 };
 
 /// Within which it is with a probability of `share`, by draws from each part.
@@ -142,6 +157,7 @@ class AnswerBuilder {
     for (std::size_t i = 0; i < points.size(); ++i)
       for (std::size_t k = 0; k < times_.size(); ++k)
         judged.frame_means[k] += judged.posterior.points[i].weight * ratios[i * times_.size() + k];
+    judged.unseen_ends = unseen_ends(*events_, *likelihood_, times_, judged, ratios);
   }
 
   Explanation explanation_of(const Judged& judged) const {
@@ -246,27 +262,19 @@ class AnswerBuilder {
   WhereItIs where(std::size_t object, const std::vector<const Judged*>& all) const {
     WhereItIs result;
     result.object = events_->objects()[object].name;
-    std::vector<PossiblePlace> places;
-    double gone = 0.0, sum = 0.0;
-    const auto note = [&](const std::optional<Pose>& X_WO, double weight, const std::vector<PathEnd>& ends) {
-      sum += weight;
-      if (!X_WO)
-        gone += weight;
-      else if (ends.empty())
-        places.push_back({X_WO->translation, geometry::Matrix3d::Zero(), weight});
-      for (const PathEnd& end : ends)
-        if (X_WO) places.push_back({X_WO->translation + end.shift, end.covariance, weight * end.weight});
-    };
+    PossiblePlaces places;
     for (const Judged* judged : all) {
       if (judged->hypothesis.kind == EventKind::kOther) {
-        if (object != judged->object) {
-          note(likelihood_->base()[object].back(), judged->probability, {});
-          continue;
-        }
-        const FramePeak& peak = likelihood_->peaks(object).back();
-        std::vector<PathEnd> ends;
-        if (peak.seen) ends.push_back({1.0, geometry::Vector3d::Zero(), peak.covariance.bottomRightCorner<3, 3>()});
-        note(judged->other_path.back(), judged->probability, ends);
+        const bool is_its = object == judged->object;
+        const auto& X_WO = is_its ? judged->other_path.back() : likelihood_->base()[object].back();
+        const FramePeak* peak = is_its ? &likelihood_->peaks(object).back() : nullptr;
+        geometry::Matrix3d covariance = geometry::Matrix3d::Zero();
+        if (peak != nullptr && peak->seen) covariance = peak->covariance.bottomRightCorner<3, 3>();
+        places.add(X_WO, judged->probability, covariance);
+        continue;
+      }
+      if (object == judged->object && !judged->unseen_ends.empty()) {
+        for (const UnseenEnd& end : judged->unseen_ends) places.add(end.X_WO, judged->probability * end.weight);
         continue;
       }
       for (std::size_t i = 0; i < judged->paths.size(); ++i) {
@@ -274,18 +282,21 @@ class AnswerBuilder {
         if (path.impossible) continue;
         const auto at = std::find(path.moved.begin(), path.moved.end(), object);
         const double weight = judged->probability * judged->posterior.points[i].weight;
-        if (at == path.moved.end())
-          note(likelihood_->base()[object].back(), weight, {});
-        else
-          note(path.paths[static_cast<std::size_t>(at - path.moved.begin())].back(), weight,
-               likelihood_->ends(path, object));
+        if (at == path.moved.end()) {
+          places.add(likelihood_->base()[object].back(), weight);
+          continue;
+        }
+        const auto& X_WO = path.paths[static_cast<std::size_t>(at - path.moved.begin())].back();
+        if (!X_WO) places.add(X_WO, weight);
+        for (const NearPath& near : likelihood_->near(path, object, times_.size() - 1))
+          places.add(X_WO, weight * near.weight, near.error.covariance().bottomRightCorner<3, 3>(), near.off.tail<3>());
       }
     }
-    result.present = sum > 0.0 ? 1.0 - gone / sum : 0.0;
+    result.present = places.all > 0.0 ? 1.0 - places.gone / places.all : 0.0;
     double there = 0.0;
-    for (const PossiblePlace& place : places) result.mean += place.weight * place.mean, there += place.weight;
+    for (const PossiblePlace& place : places.there) result.mean += place.weight * place.mean, there += place.weight;
     if (there > 0.0) result.mean /= there;
-    result.radius_90 = place_radius(places, result.mean, 0.9);
+    result.radius_90 = place_radius(places.there, result.mean, 0.9);
     // Of an object that stays, hypotheses about others know only the most probable place: what the belief knows of it.
     if (const auto index = belief::find_object(*window_.start, result.object); index && events_->is_present(object)) {
       const auto estimate = belief::estimate(*window_.start, window_.start->objects[static_cast<std::size_t>(*index)]);
@@ -296,7 +307,7 @@ class AnswerBuilder {
     const ScenePath path = most_probable_path(*all.front());
     result.out_of_sight = result.present > 0.5;
     for (const std::size_t k : likelihood_->last_frames())
-      result.out_of_sight = result.out_of_sight && likelihood_->visible_share(path, k, object) < 0.05;
+      result.out_of_sight = result.out_of_sight && likelihood_->visible_share(path, k, object) < kOutOfSight;
     return result;
   }
 

@@ -11,6 +11,12 @@
 
 namespace prescene::queries {
 
+/// Where an object may end that no frame sees there.
+struct UnseenEnd {
+  belief::Pose X_WO;
+  double weight;  ///< All sum to one.
+};
+
 /// A hypothesis with what was found of it.
 struct Judged {
   Hypothesis hypothesis;
@@ -22,6 +28,7 @@ struct Judged {
   std::vector<ScenePath> paths;  // of its points, where it is probable enough
   std::vector<EventDraw> draws;
   std::vector<belief::Trajectory> runs;
+  std::vector<UnseenEnd> unseen_ends;                   // of its object; empty = as its paths end
   std::vector<double> frame_means;                      // of the log ratio in each frame
   std::vector<std::optional<belief::Pose>> other_path;  // of `other`
   double probability = 0.0, low = 0.0, high = 1.0;

@@ -45,16 +45,20 @@ geometry::Pose PathError::pose() const {
   return {(geometry::exp_rotation(mean_.head<3>()) * X_WO_.rotation).normalized(), X_WO_.translation + mean_.tail<3>()};
 }
 
+Matrix6d PathError::growth(const Vector3d& shift, const Vector3d& turn) const {
+  const double way = share_ * (shift.norm() + radius_ * turn.norm());
+  const double lift = share_ * (std::abs(up_.dot(shift)) + radius_ * (turn - up_ * up_.dot(turn)).norm());
+  const Matrix3d along = up_ * up_.transpose(), across = Matrix3d::Identity() - along;
+  Matrix6d grown = Matrix6d::Zero();
+  grown.topLeftCorner<3, 3>() = (way * way * along + lift * lift * across) / (radius_ * radius_);
+  grown.bottomRightCorner<3, 3>() = way * way * across + lift * lift * along;
+  return grown;
+}
+
 void PathError::move_to(const geometry::Pose& X_WO) {
-  if (placed_ && share_ > 0.0) {
-    const Vector3d shift = X_WO.translation - X_WO_.translation;
-    const Vector3d turn = geometry::log_rotation(X_WO.rotation * X_WO_.rotation.conjugate());
-    const double way = share_ * (shift.norm() + radius_ * turn.norm());
-    const double lift = share_ * (std::abs(up_.dot(shift)) + radius_ * (turn - up_ * up_.dot(turn)).norm());
-    const Matrix3d along = up_ * up_.transpose(), across = Matrix3d::Identity() - along;
-    covariance_.topLeftCorner<3, 3>() += (way * way * along + lift * lift * across) / (radius_ * radius_);
-    covariance_.bottomRightCorner<3, 3>() += way * way * across + lift * lift * along;
-  }
+  if (placed_ && share_ > 0.0)
+    covariance_ += growth(X_WO.translation - X_WO_.translation,
+                          geometry::log_rotation(X_WO.rotation * X_WO_.rotation.conjugate()));
   X_WO_ = X_WO;
   placed_ = true;
 }

@@ -221,7 +221,7 @@ double WindowLikelihood::stays(std::size_t frame, std::size_t object, PathError&
 }
 
 void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratios, std::size_t of,
-                              std::vector<PathEnd>* ends) {
+                              std::vector<NearPath>* near) {
   // By how much simulated paths are off is not known: a filter for each share, and the frames weigh them.
   const std::size_t moved = path.moved.size(), shares = path.simulated ? kErrorShares.size() : 1;
   const geometry::Vector3d up = belief::up_of(*start_.scene);
@@ -241,7 +241,7 @@ void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratio
   std::vector<double> log_weight(shares, -std::log(static_cast<double>(shares))), in_frame(shares);
   // A peak is measured with all else where it was. Of two that change places, one would hide the other.
   const bool alone = !path.put_down_from || path.put_anywhere;
-  for (std::size_t k = 0; k < frames_.size(); ++k) {
+  for (std::size_t k = 0; k < log_ratios.size(); ++k) {
     const Background& known = background(k, path.moved);
     std::fill(in_frame.begin(), in_frame.end(), share_ * known.log_ratio);
     for (std::size_t m = 0; m < moved; ++m) {
@@ -285,14 +285,17 @@ void WindowLikelihood::follow(const ScenePath& path, std::span<double> log_ratio
     for (double& w : log_weight) w -= log_ratios[k];
   }
   const auto at = std::find(path.moved.begin(), path.moved.end(), of);
-  if (ends == nullptr || at == path.moved.end()) return;
+  if (near == nullptr || at == path.moved.end()) return;
+  const auto m = static_cast<std::size_t>(at - path.moved.begin());
+  const auto& last = path.paths[m][log_ratios.size() - 1];
+  if (!last) return;
   for (std::size_t s = 0; s < shares; ++s) {
-    const PathError& error = errors[s * moved + static_cast<std::size_t>(at - path.moved.begin())];
-    const auto& last = path.paths[static_cast<std::size_t>(at - path.moved.begin())].back();
-    if (!last) return;
-    ends->push_back({std::exp(log_weight[s]),
-                     error.path_pose().translation - last->translation + error.mean().tail<3>(),
-                     error.covariance().bottomRightCorner<3, 3>()});
+    const PathError& error = errors[s * moved + m];
+    const Pose X_WO = error.pose();
+    geometry::Vector6d off;
+    off.head<3>() = geometry::log_rotation(X_WO.rotation * last->rotation.conjugate());
+    off.tail<3>() = X_WO.translation - last->translation;
+    near->push_back({std::exp(log_weight[s]), off, error});
   }
 }
 
@@ -325,11 +328,19 @@ void WindowLikelihood::settle(ScenePath& path) const {
   }
 }
 
-std::vector<PathEnd> WindowLikelihood::ends(const ScenePath& path, std::size_t object) {
-  std::vector<double> log_ratios(frames_.size());
-  std::vector<PathEnd> ends;
-  follow(path, log_ratios, object, &ends);
-  return ends;
+std::vector<NearPath> WindowLikelihood::near(const ScenePath& path, std::size_t object, std::size_t frame) {
+  std::vector<double> log_ratios(frame + 1);
+  std::vector<NearPath> near;
+  follow(path, log_ratios, object, &near);
+  return near;
+}
+
+double WindowLikelihood::log_ratio(const ScenePath& path, std::size_t frame) {
+  const Background& known = background(frame, path.moved);
+  double sum = known.log_ratio;
+  for (std::size_t m = 0; m < path.moved.size(); ++m)
+    if (const auto& X_WO = path.paths[m][frame]) sum += log_ratio(path, frame, m, *X_WO, known);
+  return share_ * sum;
 }
 
 void WindowLikelihood::evaluate(std::size_t frame, std::size_t object, std::span<const Pose> X_WO,

@@ -21,6 +21,9 @@
 
 namespace prescene::queries {
 
+/// Share of an object's pixels in view below which it is out of sight.
+inline constexpr double kOutOfSight = 0.05;
+
 /// Of one object, by frame; empty = it is not there.
 using ObjectPath = std::vector<std::optional<belief::Pose>>;
 
@@ -44,11 +47,11 @@ inline ScenePath path_of(std::size_t object, ObjectPath poses) {
   return path;
 }
 
-/// Where an object may be in the last frame, given all frames, if a path is nearly the true one.
-struct PathEnd {
-  double weight = 1.0;                                    ///< All of a path sum to one.
-  geometry::Vector3d shift = geometry::Vector3d::Zero();  ///< From where the path ends, m.
-  geometry::Matrix3d covariance = geometry::Matrix3d::Zero();
+/// Where an object may be in a frame, given those up to it, if a path is nearly the true one.
+struct NearPath {
+  double weight;           ///< All of a path sum to one.
+  geometry::Vector6d off;  ///< The mean, from the path's pose: coordinates as those of FramePeak.
+  PathError error;         ///< Has the covariance.
 };
 
 class WindowLikelihood {
@@ -87,8 +90,10 @@ class WindowLikelihood {
   const geometry::Matrix6d& start_error(std::size_t object) const { return start_errors_[object]; }
   /// Sets the poses of what was put down anywhere to those that the frames see.
   void settle(ScenePath& path) const;
-  /// Of an object that the path moves.
-  std::vector<PathEnd> ends(const ScenePath& path, std::size_t object);
+  /// Of an object that the path moves, in a frame in which it is there; else empty.
+  std::vector<NearPath> near(const ScenePath& path, std::size_t object, std::size_t frame);
+  /// What the image of a frame says of a path as it is, tempered.
+  double log_ratio(const ScenePath& path, std::size_t frame);
   /// Share of the pixels of an object, as the path has it, that known things do not hide in the frame.
   double visible_share(const ScenePath& path, std::size_t frame, std::size_t object);
 
@@ -112,9 +117,9 @@ class WindowLikelihood {
   /// tempered.
   template <class Direct>
   double weigh(std::size_t object, const FramePeak* peak, PathError& error, const Direct& direct) const;
-  /// `ends`, where given, get those of the object `of`.
+  /// As many frames as there are `log_ratios`; `near`, where given, gets where the object `of` is in the last of them.
   void follow(const ScenePath& path, std::span<double> log_ratios, std::size_t of = 0,
-              std::vector<PathEnd>* ends = nullptr);
+              std::vector<NearPath>* near = nullptr);
 
   const belief::Belief& start_;
   std::span<const belief::SceneObject> objects_;

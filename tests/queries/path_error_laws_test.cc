@@ -89,6 +89,16 @@ TEST(PathError, StaysAsLongAsNothingMovesAndIsLearntFromFrames) {
   EXPECT_NEAR(std::sqrt(error.covariance()(3, 3)), 0.01 / std::sqrt(50.0), 1e-5);
 }
 
+// Of a velocity, the error after a time is that of the way.
+TEST(PathError, OfVelocitiesIsThatOfTheWayThatTheyLeadOn) {
+  PathError error(0.18, 0.05, Vector3d::UnitZ(), kNoSymmetry);
+  const Vector3d v(0.3, -0.2, -1.5), w(2.0, 0.0, 0.5);
+  const double dt = 1e-3;
+  error.move_to(Pose{});
+  error.move_to(Pose{geometry::exp_rotation(dt * w), dt * v});
+  EXPECT_NEAR((error.covariance() - dt * dt * error.growth(v, w)).norm(), 0.0, 1e-9 * error.covariance().norm());
+}
+
 TEST(PathError, TurnsThatChangeNothingDoNotCount) {
   const auto symmetry = geometry::SymmetryGroup::continuous(Vector3d::UnitZ(), true);
   FramePeak peak = peak_at({0.0, 0.0, 0.0});

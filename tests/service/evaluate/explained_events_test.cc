@@ -61,6 +61,21 @@ INSTANTIATE_TEST_SUITE_P(Kinds, ExplainedEpisodes,
                                          "exchanged"),
                          [](const auto& tested) { return tested.param; });
 
+// Where they bounce to is not known, which no share of their way says.
+TEST(ExplainedEvents, WhatFellOutOfSightMayHaveBouncedAnywhere) {
+  const prescene::tests::ScratchDir scratch;
+  int hidden = 0, within = 0;
+  for (const std::uint64_t seed : {5, 17, 26, 27}) {
+    const EpisodeResult result =
+        explain_episode(make_event_episode("pushed_off", 15000 + seed), 15000 + seed, {}, scratch.path(), {});
+    EXPECT_EQ(result.failure, "");
+    hidden += result.hidden ? 1 : 0;
+    within += result.hidden && result.place_within ? 1 : 0;
+  }
+  EXPECT_EQ(hidden, 4);
+  EXPECT_GE(within, 3);
+}
+
 EventEpisode still_until(const std::string& scene, double from, double to) {
   EventEpisode episode;
   episode.kind = "told";

@@ -68,6 +68,9 @@ class PathError {
   void loosen(const geometry::Matrix6d& covariance) { covariance_ += covariance; }
   /// The path goes on from where a frame saw the object; if it `rests`, from where it rests near there.
   void put_at(const FramePeak& peak, bool rests);
+  /// By what the error grows while the path shifts and turns so, about W's axes. Of the velocities of a path, that of
+  /// their error.
+  geometry::Matrix6d growth(const geometry::Vector3d& shift, const geometry::Vector3d& turn) const;
   /// The next pose of the simulated path.
   void move_to(const geometry::Pose& X_WO);
   /// `peak` must be seen, and there must be a pose.
