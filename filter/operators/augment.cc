@@ -95,6 +95,16 @@ bool is_same_place(const Pose& X_CO, const Pose& other_X_CO, const SearchTarget&
   return shift < kSameShift && turn < kSameTurn;
 }
 
+/// Whether what is seen at a pose would do as a find there.
+bool is_seen_there(const Pose& X_CO, const rendering::PoseEvidence& evidence, const rendering::FrameTerms& terms,
+                   const SearchTarget& target, const AugmentOptions& options, const WeightOptions& weighting,
+                   const FilterTools& tools) {
+  if (evidence.log_ratio < options.accept_log_ratio || evidence.hit_share() < kLeastHits) return false;
+  const double outline = outline_at(terms, target, X_CO, weighting, tools);
+  const double scale = evidence_scale(expected_evidence_of(terms, target, X_CO, *tools.renderer).of_visible);
+  return supported_evidence(evidence, outline, weighting) >= scale * options.accept_evidence;
+}
+
 }  // namespace
 
 std::vector<Vector3d> unexplained_points(const FilterFrame& frame, const rendering::FrameTerms& terms,
@@ -141,6 +151,9 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double reach = std::max(0.10, options.reach_speed * unseen);
   const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;
+  // More of an arm that no scene knows may look like the object than is seen of it in that arm's hand. But what is seen
+  // where it is believed to be cannot be out of reach of there.
+  if (far && unseen == 0.0 && is_seen_there(X_CO, current, terms, target, options, weighting, tools)) return false;
   const double needed = options.accept_evidence + (far ? options.far_evidence : 0.0);
   // Far from where it was, what is seen has to speak for itself.
   const double scale =

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "filter_fixture.h"
+#include "prescene/geometry/primitives.h"
 
 namespace prescene::filter_tests {
 namespace {
@@ -191,6 +192,29 @@ TEST_F(ABox, AFindOutOfReachNeedsMoreEvidence) {
   options.reach_speed = 0.1;
   ObjectBelief slow = believed_at(kElsewhere, frame_.stamp_ns - 1'000'000'000);
   EXPECT_FALSE(recovered(slow, options));
+}
+
+// As of an arm that no scene knows, of which more can be seen than of what it holds.
+TEST_F(ABox, WhatIsSeenIsNotOutOfReachOfThereHoweverMuchLooksLikeIt) {
+  const Vector3d size(0.06, 0.10, 0.18);
+  sequence_ = still_sequence({box_model("box", size), box_model("looks_like_it", size)}, {X_WO_, kElsewhere});
+  // Hides the lower half of the box.
+  const Vector3d towards_camera = (sequence_.X_WC.translation - X_WO_.translation).normalized();
+  Pose X_WM = X_WO_;
+  X_WM.translation += 0.12 * Vector3d(towards_camera.x(), towards_camera.y(), 0.0).normalized();
+  X_WM.translation.z() = 0.05;
+  sequence_.occluders = {
+      {geometry::make_mesh(geometry::BoxShape{{0.16, 0.16, 0.10}}), [X_WM](double) { return X_WM; }}};
+  observation_ = sequence_.observe(30, *backends_.renderer);
+  frame_ = backends_.frame_of(sequence_.scene, observation_);
+  target_ = target_of(sequence_.scene->models[0], frame_, backends_.tools);
+  ASSERT_GT(evidence_of(kElsewhere).log_ratio, evidence_of(X_WO_).log_ratio + AugmentOptions().min_gain);
+  ASSERT_GT(evidence_of(X_WO_).log_ratio, AugmentOptions().accept_log_ratio);
+  ObjectBelief just_seen = believed_at(X_WO_, frame_.stamp_ns);
+  EXPECT_FALSE(recovered(just_seen));
+  // Where nothing like it is seen, it may have been wrong all along.
+  ObjectBelief wrong = believed_at(Pose::from_translation({0.2, -0.05, 0.09}), frame_.stamp_ns);
+  EXPECT_TRUE(recovered(wrong));
 }
 
 TEST_F(ABox, UnexplainedAreItsPixelsUntilItIsKnown) {
