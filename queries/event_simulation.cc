@@ -374,11 +374,14 @@ void EventPaths::go_on(const Hypothesis& hypothesis, double time, std::span<cons
     alone = alone && paths[i].moved.size() == 1;
   }
   const auto after = run(states, actions, alone ? std::optional(hypothesis.object) : std::nullopt);
-  for (std::size_t i = 0; i < n; ++i)
+  for (std::size_t i = 0; i < n; ++i) {
+    paths[i].impossible = after[i].end == belief::TrajectoryEnd::kDiverged;
+    failed_ += paths[i].impossible ? 1 : 0;
     for (std::size_t m = 0; m < paths[i].moved.size(); ++m)
       for (std::size_t k = 0; k < times_.size(); ++k)
         if (times_[k] > time && paths[i].paths[m][k])
           paths[i].paths[m][k] = pose_in(after[i], paths[i].moved[m], times_[k]);
+  }
 }
 
 }  // namespace prescene::queries

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "prescene/core/random.h"
 #include "prescene/geometry/dense_solvers.h"
@@ -74,6 +75,7 @@ std::vector<UnseenEnd> unseen_ends(EventPaths& events, WindowLikelihood& likelih
   std::vector<double> log_weight(paths.size());
   double top = -1e300, sum = 0.0;
   for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (paths[i].impossible) continue;
     log_weight[i] = std::log(judged.posterior.points[of[i]].weight);
     for (std::size_t k = *seen + 1; k < times.size(); ++k)
       log_weight[i] += likelihood.log_ratio(paths[i], k) - log_ratios[of[i] * times.size() + k];
@@ -84,7 +86,7 @@ std::vector<UnseenEnd> unseen_ends(EventPaths& events, WindowLikelihood& likelih
     const auto m =
         std::lower_bound(paths[i].moved.begin(), paths[i].moved.end(), judged.object) - paths[i].moved.begin();
     const auto& X_WO = paths[i].paths[static_cast<std::size_t>(m)].back();
-    if (!X_WO) continue;
+    if (paths[i].impossible || !X_WO) continue;
     ends.push_back({*X_WO, std::exp(log_weight[i] - top)});
     sum += ends.back().weight;
   }

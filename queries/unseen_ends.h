@@ -6,6 +6,7 @@
 // when it was seen last, each off by a draw of the error that the frames leave.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "explain_answer.h"
