@@ -186,6 +186,8 @@ class EventPaths {
                                       std::optional<std::size_t> moved = {});
   std::vector<belief::Action> actions_from(double time) const;
   bool touch(std::size_t object, const belief::WorldState& state, EventDraw& draw) const;
+  /// In W, of a push or a blow.
+  geometry::Vector3d direction_of(const EventDraw& draw) const;
   belief::Push push_of(const EventDraw& draw) const;
   void begin_event(const Hypothesis& hypothesis, belief::WorldState& state, EventDraw& draw,
                    std::vector<belief::Action>& actions, bool* possible) const;

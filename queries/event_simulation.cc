@@ -74,11 +74,16 @@ Vector3d horizontal_x(const Vector3d& up) {
   return (x.norm() > 1e-6 ? x : Vector3d(Vector3d::UnitY() - up * up.y())).normalized();
 }
 
+Vector3d EventPaths::direction_of(const EventDraw& draw) const {
+  const Vector3d up = belief::up_of(*scene_);
+  const Vector3d x = horizontal_x(up);
+  return std::cos(draw.direction) * x + std::sin(draw.direction) * up.cross(x);
+}
+
 bool EventPaths::touch(std::size_t object, const belief::WorldState& state, EventDraw& draw) const {
   const Pose& X_WO = state.objects[object].X_WO;
   const Vector3d up = belief::up_of(*scene_);
-  const Vector3d x = horizontal_x(up);
-  const Vector3d along = std::cos(draw.direction) * x + std::sin(draw.direction) * up.cross(x);
+  const Vector3d along = direction_of(draw);
   const Vector3d across = up.cross(along);
   const Vector3d p_WCm = X_WO * state.objects[object].physical.center_of_mass;
   double lowest = 1e300, highest = -1e300, half_width = 0.0, reach = 0.0;
@@ -111,9 +116,7 @@ bool EventPaths::touch(std::size_t object, const belief::WorldState& state, Even
 }
 
 belief::Push EventPaths::push_of(const EventDraw& draw) const {
-  const Vector3d up = belief::up_of(*scene_);
-  const Vector3d x = horizontal_x(up);
-  const Vector3d along = std::cos(draw.direction) * x + std::sin(draw.direction) * up.cross(x);
+  const Vector3d along = direction_of(draw);
   belief::Push push;
   push.radius = priors_.pusher_radius;
   push.from = draw.touched_W - (push.radius + kPusherGap) * along;
@@ -139,9 +142,7 @@ void EventPaths::begin_event(const Hypothesis& hypothesis, belief::WorldState& s
     actions.push_back({0.0, push_of(draw)});
     return;
   }
-  const Vector3d up = belief::up_of(*scene_);
-  const Vector3d x = horizontal_x(up);
-  const Vector3d along = std::cos(draw.direction) * x + std::sin(draw.direction) * up.cross(x);
+  const Vector3d along = direction_of(draw);
   object.mode = belief::MotionMode::kMoving;
   const belief::ObjectModel& moved = model(hypothesis.object);
   const geometry::Matrix3d R = object.X_WO.rotation.toRotationMatrix();

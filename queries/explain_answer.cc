@@ -223,9 +223,9 @@ class AnswerBuilder {
       const TemperedPoint& point = judged.posterior.points[i];
       if (point.log_likelihood > judged.posterior.points[best].log_likelihood) best = i;
       const ScenePath& path = judged.paths[i];
-      const auto at = std::find(path.moved.begin(), path.moved.end(), judged.object);
-      if (path.impossible || at == path.moved.end()) continue;
-      const auto& end = path.paths[static_cast<std::size_t>(at - path.moved.begin())].back();
+      const ObjectPath* moves = path.of(judged.object);
+      if (path.impossible || moves == nullptr) continue;
+      const auto& end = moves->back();
       if (!end) continue;
       const geometry::Vector3d com = belief::mean(events_->model(judged.object).center_of_mass);
       const double tilt =
@@ -252,9 +252,8 @@ class AnswerBuilder {
   std::optional<Pose> pose_in_frame(const ScenePath& path, const std::string& name, std::size_t frame) const {
     for (std::size_t i = 0; i < events_->objects().size(); ++i) {
       if (events_->objects()[i].name != name) continue;
-      const auto at = std::find(path.moved.begin(), path.moved.end(), i);
-      return at == path.moved.end() ? likelihood_->base()[i][frame]
-                                    : path.paths[static_cast<std::size_t>(at - path.moved.begin())][frame];
+      const ObjectPath* moves = path.of(i);
+      return (moves != nullptr ? *moves : likelihood_->base()[i])[frame];
     }
     return std::nullopt;
   }
@@ -280,13 +279,13 @@ class AnswerBuilder {
       for (std::size_t i = 0; i < judged->paths.size(); ++i) {
         const ScenePath& path = judged->paths[i];
         if (path.impossible) continue;
-        const auto at = std::find(path.moved.begin(), path.moved.end(), object);
+        const ObjectPath* moves = path.of(object);
         const double weight = judged->probability * judged->posterior.points[i].weight;
-        if (at == path.moved.end()) {
+        if (moves == nullptr) {
           places.add(likelihood_->base()[object].back(), weight);
           continue;
         }
-        const auto& X_WO = path.paths[static_cast<std::size_t>(at - path.moved.begin())].back();
+        const auto& X_WO = moves->back();
         if (!X_WO) places.add(X_WO, weight);
         for (const NearPath& near : likelihood_->near(path, object, times_.size() - 1))
           places.add(X_WO, weight * near.weight, near.error.covariance().bottomRightCorner<3, 3>(), near.off.tail<3>());

@@ -53,8 +53,8 @@ std::vector<UnseenEnd> unseen_ends(EventPaths& events, WindowLikelihood& likelih
   const core::RandomStream stream(judged.number, core::Purpose::kNearbyStart);
   for (std::size_t i = 0; i < judged.paths.size(); ++i) {
     const ScenePath& path = judged.paths[i];
-    const bool moves = std::binary_search(path.moved.begin(), path.moved.end(), judged.object);
-    if (path.impossible || !path.simulated || !moves || judged.draws[i].time > time) continue;
+    if (path.impossible || !path.simulated || path.of(judged.object) == nullptr || judged.draws[i].time > time)
+      continue;
     const auto near = likelihood.near(path, judged.object, *seen);
     if (near.empty()) continue;
     core::RandomStream random = stream.at(i);
@@ -83,9 +83,7 @@ std::vector<UnseenEnd> unseen_ends(EventPaths& events, WindowLikelihood& likelih
   }
   std::vector<UnseenEnd> ends;
   for (std::size_t i = 0; i < paths.size(); ++i) {
-    const auto m =
-        std::lower_bound(paths[i].moved.begin(), paths[i].moved.end(), judged.object) - paths[i].moved.begin();
-    const auto& X_WO = paths[i].paths[static_cast<std::size_t>(m)].back();
+    const auto& X_WO = paths[i].of(judged.object)->back();
     if (paths[i].impossible || !X_WO) continue;
     ends.push_back({*X_WO, std::exp(log_weight[i] - top)});
     sum += ends.back().weight;

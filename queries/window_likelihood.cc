@@ -353,19 +353,16 @@ void WindowLikelihood::evaluate(std::size_t frame, std::size_t object, std::span
 }
 
 double WindowLikelihood::visible_share(const ScenePath& path, std::size_t frame, std::size_t object) {
-  const auto at = std::lower_bound(path.moved.begin(), path.moved.end(), object);
-  const bool moves = at != path.moved.end() && *at == object;
-  const auto& X_WO =
-      moves ? path.paths[static_cast<std::size_t>(at - path.moved.begin())][frame] : base_[object][frame];
+  const auto pose_of = [&](std::size_t i) -> const std::optional<Pose>& {
+    const ObjectPath* moves = path.of(i);
+    return (moves != nullptr ? *moves : base_[i])[frame];
+  };
+  const auto& X_WO = pose_of(object);
   if (!X_WO) return 0.0;
   geometry::DepthImage hides = frames_[frame].robot;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     if (i == object) continue;
-    const auto other = std::lower_bound(path.moved.begin(), path.moved.end(), i);
-    const bool other_moves = other != path.moved.end() && *other == i;
-    const auto& X_WI =
-        other_moves ? path.paths[static_cast<std::size_t>(other - path.moved.begin())][frame] : base_[i][frame];
-    if (X_WI) filter::merge_nearest(depth_of(frame, i, *X_WI), &hides);
+    if (const auto& X_WI = pose_of(i)) filter::merge_nearest(depth_of(frame, i, *X_WI), &hides);
   }
   const rendering::PoseEvidence seen = evidence(frame, terms_with(frame, hides), object, *X_WO);
   // By how much of it would be in view if nothing stood before it, the image's edge included.

@@ -6,6 +6,7 @@
 // hypotheses have them come first and are worked out once.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -37,6 +38,13 @@ struct ScenePath {
   /// `put_anywhere`, nearly where the path has it.
   std::optional<std::size_t> put_down_from;
   bool put_anywhere = false;
+
+  /// Of an object that moves; else nullptr.
+  const ObjectPath* of(std::size_t object) const {
+    const auto at = std::lower_bound(moved.begin(), moved.end(), object);
+    if (at == moved.end() || *at != object) return nullptr;
+    return &paths[static_cast<std::size_t>(at - moved.begin())];
+  }
 };
 
 /// Of one object, which is at these poses.
