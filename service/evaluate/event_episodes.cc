@@ -88,7 +88,7 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
     const Thing thing = everyday_thing(w, "thing_0", seed);
     const Vector3d p(w.between(-0.05, 0.05), w.between(-0.05, 0.05), w.between(0.06, 0.14) + thing.height);
     // A hand with the fingers a little apart, so that nothing is held by accident.
-    w.hand("gripper", kGripper, {{p + Vector3d(0, 0, 2.0 * thing.height + 0.06), Vector3d::Zero()}}, {0.0});
+    w.hand("gripper", kGripper, {{p + Vector3d(0, 0, thing.height + thing.top + 0.06), Vector3d::Zero()}}, {0.0});
     w.object("thing_0", "thing_0", p, {0, 0, w.between(-60, 60)}, ", held_by: gripper");
     w.camera_at(p + Vector3d(0, 0, 0.05));
     w.camera = "  width: 320\n  height: 240\n" + w.camera;

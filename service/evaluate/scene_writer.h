@@ -78,6 +78,7 @@ struct Thing {
   std::string name;
   double height = 0.0;  ///< m, of its frame's origin above what it stands on.
   double reach = 0.0;   ///< m, half of its horizontal extent.
+  double top = 0.0;     ///< m, of its highest point above its frame's origin.
 };
 
 /// One of six everyday things as a model of that name.
@@ -88,18 +89,18 @@ inline Thing everyday_thing(SceneWriter& w, const std::string& name, std::uint64
       const double h = w.about(0.19, 0.1);
       w.model(name, "gable_carton: {base: [0.07, 0.07], shoulder_height: " + number(0.83 * h) +
                         ", height: " + number(h) + "}" + contact + ", symmetry: {axis: z, order: 2}, color: '#e8ecf4'");
-      return {name, 0.5 * h, 0.05};
+      return {name, 0.5 * h, 0.05, 0.5 * h};
     }
     case 1: {
       const double r = w.about(0.034, 0.1), h = w.about(0.11, 0.1);
       w.model(name, "cylinder: {radius: " + number(r) + ", length: " + number(h) + "}" + contact +
                         ", symmetry: {axis: z, continuous: true, flip: true}, color: '#c03020'");
-      return {name, 0.5 * h, r};
+      return {name, 0.5 * h, r, 0.5 * h};
     }
     case 2: {
       const geometry::Vector3d size(w.about(0.09, 0.15), w.about(0.06, 0.15), w.about(0.14, 0.15));
       w.model(name, "box: " + list(size) + contact + ", symmetry: cuboid, color: '#3060c0'");
-      return {name, 0.5 * size.z(), 0.5 * std::hypot(size.x(), size.y())};
+      return {name, 0.5 * size.z(), 0.5 * std::hypot(size.x(), size.y()), 0.5 * size.z()};
     }
     case 3: {
       const double r = w.about(0.038, 0.1), h = w.about(0.095, 0.1);
@@ -110,23 +111,25 @@ inline Thing everyday_thing(SceneWriter& w, const std::string& name, std::uint64
                         "]}, {box: [0.022, 0.010, 0.012], position: [" + number(r + 0.008) + ", 0, " +
                         number(-0.2 * h) + "]}, {box: [0.010, 0.010, " + number(0.45 * h + 0.012) + "], position: [" +
                         number(r + 0.023) + ", 0, " + number(0.025 * h) + "]}]" + contact + ", color: '#40a060'");
-      return {name, 0.5 * h, r + 0.028};
+      return {name, 0.5 * h, r + 0.028, 0.5 * h};
     }
     case 4: {
       const geometry::Vector3d size(w.about(0.15, 0.1), w.about(0.10, 0.1), w.about(0.04, 0.15));
       w.model(name, "box: " + list(size) + contact + ", symmetry: cuboid, color: '#d0b040'");
-      return {name, 0.5 * size.z(), 0.5 * std::hypot(size.x(), size.y())};
+      return {name, 0.5 * size.z(), 0.5 * std::hypot(size.x(), size.y()), 0.5 * size.z()};
     }
     default: {
       const double h = w.about(0.20, 0.1);
       w.model(name, "lathe: {profile: [[0.030, 0], [0.032, " + number(0.6 * h) + "], [0.013, " + number(0.85 * h) +
                         "], [0.013, " + number(h) + "]], segments: 32, use: convex_hull}" + contact +
                         ", symmetry: {axis: z, continuous: true}, color: '#208080'");
-      return {name, 0.0, 0.032};
+      return {name, 0.0, 0.032, h};
     }
   }
 }
 
+/// A hand with two fingers that reach from 1 cm below its frame's origin to the palm, kPalmHeight above it.
+inline constexpr double kPalmHeight = 0.05;  // m
 inline constexpr const char* kGripper =
     "parts: [{box: [0.018, 0.022, 0.06], position: [0.055, 0, 0.02]}, {box: [0.018, 0.022, 0.06], position: [-0.055, "
     "0, "

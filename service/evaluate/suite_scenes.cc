@@ -50,7 +50,9 @@ SuiteScene in_hand(Writer& w, std::uint64_t seed) {
   table(w);
   const Thing thing = everyday_thing(w, "thing", seed);
   const Vector3d p(w.between(-0.05, 0.05), w.between(-0.05, 0.05), 0.10);
-  carry(w, "gripper", p + Vector3d(0, 0, thing.height + 0.03), 0.3, 3.0);
+  // Between the fingers, below the palm.
+  const double grip = std::max(0.03, thing.top - (kPalmHeight - 0.005));
+  carry(w, "gripper", p + Vector3d(0, 0, thing.height + grip), 0.3, 3.0);
   w.object("thing", "thing", p + Vector3d(0, 0, thing.height), {0, 0, w.between(-60, 60)}, ", held_by: gripper");
   w.camera_at(p + Vector3d(0, 0, 0.15));
   return {w.text("in_hand", 3.0, true), w.text("in_hand", 3.0, true), {}, true};
