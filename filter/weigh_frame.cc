@@ -44,6 +44,7 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
   std::vector<double> before;
   for (const Particle& particle : seen.particles) before.push_back(particle.log_weight);
   WeightContext context{.supports = frame.surfaces.get(),
+                        .solids = &frame.solids,
                         .was_unseen = was_unseen_by(seen, step.observation.camera),
                         .depth = step.observation.frame.depth.get(),
                         .camera = step.observation.frame.camera};

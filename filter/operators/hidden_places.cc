@@ -25,8 +25,8 @@ std::vector<Pose> hidden_places(const FilterFrame& frame, const rendering::Frame
     for (int k = 0; k < 6; ++k) d[k] = stream.normal() * (k < 3 ? reach.turn : reach.shift);
     if (!reach.fall.isZero(0.0)) d.tail<3>() += stream.uniform() * reach.fall;
     const Pose moved = moved_about(X_WO, target.centre(), d);
-    if (frame.surfaces->crosses(p_WQ, moved * target.centre())) continue;
-    if (frame.surfaces->overlap(*target.mesh, moved, weighting.support_tolerance) > 0.0) continue;
+    if (frame.solids.crosses(p_WQ, moved * target.centre())) continue;
+    if (frame.solids.overlap(*target.mesh, moved, weighting.support_tolerance) > 0.0) continue;
     free.push_back(moved);
     hypotheses.push_back(hypothesis(target, frame.X_CW * moved));
   }

@@ -176,9 +176,10 @@ double ParticleUpdate::outline(const Pose& X_WO) const {
   return outline_at(terms_, target_, X_CW_ * X_WO, options_, tools_);
 }
 
-double ParticleUpdate::log_overlap(const Pose& X_WO) const {
-  if (context_.supports == nullptr || context_.supports->empty()) return 0.0;
-  const double overlap = context_.supports->overlap(*target_.mesh, X_WO, options_.support_tolerance);
+double ParticleUpdate::log_overlap(const belief::Particle& particle) const {
+  const SupportSurfaces* solids = particle.mode == belief::MotionMode::kHeld ? context_.supports : context_.solids;
+  if (solids == nullptr || solids->empty()) return 0.0;
+  const double overlap = solids->overlap(*target_.mesh, particle.X_WO, options_.support_tolerance);
   return kLogInSupport * std::min(1.0, overlap / kFullOverlap);
 }
 

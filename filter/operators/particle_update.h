@@ -80,8 +80,9 @@ class ParticleUpdate {
   const Outline* outline_near(const Pose& X_WO, std::optional<Outline>& own) const;
   rendering::PoseEvidence evidence(const Pose& X_WO) const;
   double outline(const Pose& X_WO) const;
-  /// What it costs to be where a support is.
-  double log_overlap(const Pose& X_WO) const;
+  /// What it costs to be where a support is, or a body of the robot. What is held was seen in the hand, whatever the
+  /// hand's shape says.
+  double log_overlap(const belief::Particle& particle) const;
 
   bool was_unseen() const { return context_.was_unseen; }
   double weight_share() const { return weight_share_; }

@@ -41,7 +41,7 @@ ParticleWeight update(const ParticleUpdate& frame, double dt, bool first, const 
   if (hidden) {
     stay.hidden = true;
     log_stay = log_becomes_hidden + frame.weight_share() * std::min(0.0, stay.evidence.visible_log_ratio) +
-               frame.log_overlap(particle.X_WO);
+               frame.log_overlap(particle);
   }
 
   const Mode mode =

@@ -75,8 +75,14 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   PRESCENE_RETURN_IF_ERROR(geometry::validate(rgbd.camera).at("the frame's camera"));
 
   const BeliefView known = known_surroundings(*scene, X_WG, MeshDetail::kDisplay, *tools.meshes);
-  if (cache.scene != scene || !cache.surfaces)
+  if (cache.scene != scene || !cache.surfaces) {
     cache.surfaces = std::make_shared<const SupportSurfaces>(*scene, *tools.meshes);
+    cache.robot.assign(scene->robot.size(), {});
+    for (std::size_t i = 0; i < scene->robot.size(); ++i) {
+      const belief::KinematicBody& body = scene->robot[i];
+      cache.robot[i].add(*tools.meshes->get(body.visual, body.collision, MeshDetail::kLikelihood), Pose::identity());
+    }
+  }
   if (cache.scene != scene || !(cache.camera == rgbd.camera) || !(cache.X_WC == observation.X_WC)) {
     PRESCENE_RETURN_IF_ERROR(render_depth(only(known, InstanceKind::kSupport), rgbd.camera, observation.X_WC,
                                           *tools.renderer, &cache.supports));
@@ -86,6 +92,8 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   }
 
   frame->surfaces = cache.surfaces;
+  frame->solids = *cache.surfaces;
+  for (std::size_t i = 0; i < X_WG.size(); ++i) frame->solids.place(cache.robot[i], X_WG[i]);
   frame->stamp_ns = observation.stamp_ns;
   frame->X_WC = observation.X_WC;
   frame->X_CW = observation.X_WC.inverse();

@@ -47,7 +47,7 @@ void SupportSurfaces::add(const rendering::RenderMesh& mesh, const geometry::Pos
     }
     part.triangles.push_back({p[0], p[1] - p[0], p[2] - p[0]});
   }
-  if (!part.triangles.empty()) parts_.push_back(std::move(part));
+  if (!part.triangles.empty()) parts_.push_back({std::make_shared<const Part>(std::move(part)), {}});
 }
 
 void SupportSurfaces::add(const rendering::SupportRegion& region, const geometry::Pose& X_WC) {
@@ -61,10 +61,15 @@ void SupportSurfaces::add(const rendering::SupportRegion& region, const geometry
     part.triangles.push_back({corners[0], corners[i] - corners[0], corners[i + 1] - corners[0]});
   // Of no thickness: nothing is inside.
   part.closed = false;
-  if (!part.triangles.empty()) parts_.push_back(std::move(part));
+  if (!part.triangles.empty()) parts_.push_back({std::make_shared<const Part>(std::move(part)), {}});
 }
 
-int SupportSurfaces::crossings(const Part& part, const Vector3d& p, const Vector3d& q) const {
+void SupportSurfaces::place(const SupportSurfaces& body, const geometry::Pose& X_WB) {
+  const geometry::Pose X_BW = X_WB.inverse();
+  for (const Placed& placed : body.parts_) parts_.push_back({placed.part, placed.X_PW ? *placed.X_PW * X_BW : X_BW});
+}
+
+int SupportSurfaces::crossings(const Part& part, const Vector3d& p, const Vector3d& q) {
   if (!boxes_meet(part.box, p, q)) return 0;
   const Vector3d pq = q - p;
   return static_cast<int>(std::count_if(part.triangles.begin(), part.triangles.end(),
@@ -72,15 +77,19 @@ int SupportSurfaces::crossings(const Part& part, const Vector3d& p, const Vector
 }
 
 bool SupportSurfaces::crosses(const Vector3d& p_W, const Vector3d& q_W) const {
-  return std::any_of(parts_.begin(), parts_.end(), [&](const Part& part) { return crossings(part, p_W, q_W) > 0; });
+  return std::any_of(parts_.begin(), parts_.end(), [&](const Placed& placed) {
+    return crossings(*placed.part, placed.in_part(p_W), placed.in_part(q_W)) > 0;
+  });
 }
 
 bool SupportSurfaces::inside(const Vector3d& p_W) const {
-  return std::any_of(parts_.begin(), parts_.end(), [&](const Part& part) {
-    if (!part.closed || !part.box.contains(p_W)) return false;
+  return std::any_of(parts_.begin(), parts_.end(), [&](const Placed& placed) {
+    const Part& part = *placed.part;
+    const Vector3d p = placed.in_part(p_W);
+    if (!part.closed || !part.box.contains(p)) return false;
     // A direction that runs along no edge of things built at right angles.
-    const Vector3d away = p_W + 2.0 * part.box.diagonal().norm() * Vector3d(0.2673, 0.5345, 0.8018);
-    return crossings(part, p_W, away) % 2 == 1;
+    const Vector3d away = p + 2.0 * part.box.diagonal().norm() * Vector3d(0.2673, 0.5345, 0.8018);
+    return crossings(part, p, away) % 2 == 1;
   });
 }
 

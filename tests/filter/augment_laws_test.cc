@@ -217,6 +217,25 @@ TEST_F(ABox, WhatIsSeenIsNotOutOfReachOfThereHoweverMuchLooksLikeIt) {
   EXPECT_TRUE(recovered(wrong));
 }
 
+TEST_F(ABox, IsNotRecoveredInAnArmThatStandsALittleAsideOfWhereItIsSaidToBe) {
+  see(X_WO_);  // or an arm of its size, with its pose said to be 2 cm farther from the camera
+  auto scene = std::make_shared<belief::Scene>(*sequence_.scene);
+  belief::KinematicBody arm;
+  arm.name = "arm";
+  arm.collision = scene->models[0].collision;
+  scene->robot = {arm};
+  const auto recovered_with_arm_at = [&](const Pose& X_WG) {
+    frame_ = backends_.frame_of(scene, observation_, {{X_WG}});
+    target_ = target_of(scene->models[0], frame_, backends_.tools);
+    ObjectBelief object = believed_at(kElsewhere, kLongAgo);
+    return recovered(object);
+  };
+  Pose aside = X_WO_;
+  aside.translation += 0.02 * (X_WO_.translation - sequence_.X_WC.translation).normalized();
+  EXPECT_FALSE(recovered_with_arm_at(aside));
+  EXPECT_TRUE(recovered_with_arm_at(Pose::from_translation({0.0, 0.0, 3.0})));
+}
+
 TEST_F(ABox, UnexplainedAreItsPixelsUntilItIsKnown) {
   see(X_WO_);
   const std::vector<Vector3d> points = unexplained_points(frame_, frame_.terms, 0.015);

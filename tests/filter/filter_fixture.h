@@ -32,10 +32,11 @@ struct Backends {
     return ParticleFilter(*likelihood, *renderer, threads, std::move(settings), std::move(simulators));
   }
 
-  FilterFrame frame_of(const std::shared_ptr<const belief::Scene>& scene, const belief::Observation& observation) {
+  FilterFrame frame_of(const std::shared_ptr<const belief::Scene>& scene, const belief::Observation& observation,
+                       std::span<const Pose> X_WG = {}) {
     FilterFrame frame;
     FrameCache cache;
-    const core::Status status = prepare_frame(scene, observation, {}, {}, {}, tools, cache, &frame);
+    const core::Status status = prepare_frame(scene, observation, X_WG, {}, {}, tools, cache, &frame);
     PRESCENE_CHECK_MSG(status.ok(), status.message());
     return frame;
   }

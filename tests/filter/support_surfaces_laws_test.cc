@@ -67,6 +67,29 @@ TEST(SupportSurfaces, WhatStandsInABinIsFreeAndWhatSticksInItsWallIsNot) {
   EXPECT_EQ(surfaces.overlap(*box, Pose::from_translation({0.4, 0.0, -0.02}), tolerance), 1.0);
 }
 
+TEST(SupportSurfaces, WhatABodyIsInTheWayOfMovesWithIt) {
+  MeshCache meshes;
+  const auto box = rendering::make_render_mesh(geometry::make_mesh(geometry::BoxShape{Vector3d(0.07, 0.05, 0.2)}));
+  const SupportSurfaces in_own_frame(bin_on_table(), meshes);
+  core::RandomStream stream(7, core::Purpose::kTest);
+  const auto random_pose = [&stream] {
+    const Vector3d turn(stream.uniform(-1.0, 1.0), stream.uniform(-1.0, 1.0), stream.uniform(-1.0, 1.0));
+    return Pose{geometry::exp_rotation(turn),
+                {stream.uniform(-0.2, 0.2), stream.uniform(-0.2, 0.2), stream.uniform(-0.1, 0.3)}};
+  };
+  int partly = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Pose X_WB = random_pose(), X_BO = random_pose();
+    SupportSurfaces surfaces;
+    surfaces.place(in_own_frame, X_WB);
+    const double overlap = in_own_frame.overlap(*box, X_BO, 0.01);
+    EXPECT_EQ(surfaces.overlap(*box, X_WB * X_BO, 0.01), overlap);
+    EXPECT_EQ(surfaces.inside(X_WB * X_BO.translation), in_own_frame.inside(X_BO.translation));
+    partly += overlap > 0.0 && overlap < 1.0;
+  }
+  EXPECT_GT(partly, 50);
+}
+
 TEST(SupportSurfaces, NothingIsInTheWayWhereThereIsNoSupport) {
   MeshCache meshes;
   const SupportSurfaces surfaces(belief::Scene{}, meshes);

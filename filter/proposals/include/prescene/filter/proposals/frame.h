@@ -57,18 +57,21 @@ struct FilterFrame {
   geometry::DepthImage supports;                    ///< Their depth in terms.camera, 0 = none.
   geometry::DepthImage robot;                       ///< The same of the robot's bodies.
   std::shared_ptr<const SupportSurfaces> surfaces;  ///< Of the supports, where no object can be. Never null.
+  SupportSurfaces solids;                           ///< The same, and the robot's bodies at X_WG.
   /// Names of models, then of objects, in the order of terms.color_ratio.
   std::vector<std::string> color_models;
   std::vector<std::string> color_objects;
 };
 
-/// The supports alone, rendered and as surfaces, kept while camera and supports stay where they are.
+/// The supports alone, rendered and as surfaces, kept while camera and supports stay where they are; and the robot's
+/// bodies, each in its own frame, kept with the scene.
 struct FrameCache {
   std::shared_ptr<const belief::Scene> scene;
   geometry::PinholeCamera camera;
   Pose X_WC;
   geometry::DepthImage supports;
   std::shared_ptr<const SupportSurfaces> surfaces;
+  std::vector<SupportSurfaces> robot;
 };
 
 using ColorModels = std::map<std::string, rendering::ColorModel>;

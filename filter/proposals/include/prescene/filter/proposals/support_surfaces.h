@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where an object cannot be, seen or not: inside a support, or half on its other side. Depth says nothing about a
-// hidden object, so without this its particles would sink into the floor and the walls that hide it.
+// Where an object cannot be, seen or not: inside a support or a body of the robot, or half on its other side. Depth
+// says nothing about a hidden object, so without this its particles would sink into the floor and the walls that hide
+// it.
 //
 //   SupportSurfaces surfaces(*scene, meshes);
 //   surfaces.overlap(*target.mesh, X_WO, 0.015);   // 0: free, 1: inside a support
+//   surfaces.place(gripper, X_WG);                 // surfaces of a body that moves, known in its own frame
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "prescene/belief/scene.h"
@@ -14,7 +18,8 @@
 
 namespace prescene::filter {
 
-/// The triangles of a scene's supports, in W. Safe to read from several threads.
+/// The triangles of a scene's supports, in W, and of what else is put there. Copies share them. Safe to read from
+/// several threads.
 class SupportSurfaces {
  public:
   SupportSurfaces() = default;
@@ -23,6 +28,8 @@ class SupportSurfaces {
   /// Adds a flat region that is known in C, and a thing.
   void add(const rendering::SupportRegion& region, const geometry::Pose& X_WC);
   void add(const rendering::RenderMesh& mesh, const geometry::Pose& X_WM);
+  /// Adds surfaces that are known in the frame B of a body, where the body is now.
+  void place(const SupportSurfaces& body, const geometry::Pose& X_WB);
 
   bool empty() const { return parts_.empty(); }
 
@@ -45,9 +52,15 @@ class SupportSurfaces {
     geometry::Box box;
     bool closed = true;
   };
-  int crossings(const Part& part, const geometry::Vector3d& p, const geometry::Vector3d& q) const;
+  /// A part and where it is; in W itself without a pose.
+  struct Placed {
+    std::shared_ptr<const Part> part;
+    std::optional<geometry::Pose> X_PW;
+    geometry::Vector3d in_part(const geometry::Vector3d& p_W) const { return X_PW ? *X_PW * p_W : p_W; }
+  };
+  static int crossings(const Part& part, const geometry::Vector3d& p, const geometry::Vector3d& q);
 
-  std::vector<Part> parts_;  // one a support
+  std::vector<Placed> parts_;  // one a support or body
 };
 
 }  // namespace prescene::filter
