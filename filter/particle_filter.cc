@@ -191,7 +191,8 @@ void ParticleFilter::recover_all(FrameStep& step) {
     if (is_believed) weigh_turns(step, i);
     // The first frame was searched by first_look(), which asks more of a find.
     const bool is_first = belief.step == 1 && has_wide_prior(belief.scene->objects[i]);
-    const bool look = !is_first && wants_recovery(settings_.augment, object, step.frame_number() + i);
+    const bool look = !is_first && wants_recovery(settings_.augment, object, step.reports[i].expected_evidence,
+                                                  step.frame_number() + i);
     const bool is_unseen = object.state == TrackState::kUnseen;
     if (!look && !is_unseen && object.frames_refuted == 0) continue;
     const SearchTarget target = target_in(step, i);

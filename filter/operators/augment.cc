@@ -121,10 +121,13 @@ std::vector<Vector3d> unexplained_points(const FilterFrame& frame, const renderi
   return points;
 }
 
-bool wants_recovery(const AugmentOptions& options, const ObjectBelief& object, std::uint64_t frame) {
+bool wants_recovery(const AugmentOptions& options, const ObjectBelief& object, double expected_evidence,
+                    std::uint64_t frame) {
   const auto is_turn = [&](int every) { return frame % static_cast<std::uint64_t>(std::max(1, every)) == 0; };
   if (object.frames_unseen >= options.recover_after_frames) return is_turn(options.recover_every);
-  return object.visible_share < options.suspicious_share && is_turn(options.suspicious_every);
+  const bool is_short =
+      std::isfinite(expected_evidence) && object.evidence_per_pixel < options.short_share * expected_evidence;
+  return (object.visible_share < options.suspicious_share || is_short) && is_turn(options.suspicious_every);
 }
 
 bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,

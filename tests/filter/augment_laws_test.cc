@@ -37,13 +37,15 @@ TEST(WantsRecovery, CountsTurnsByHand) {
   options.recover_every = 3;
   options.suspicious_share = 0.75;
   options.suspicious_every = 10;
-  const auto turns = [&options](int frames_unseen, double visible_share) {
+  options.short_share = 0.8;
+  const auto turns = [&options](int frames_unseen, double visible_share, double evidence = 5.0) {
     ObjectBelief object;
     object.frames_unseen = frames_unseen;
     object.visible_share = visible_share;
+    object.evidence_per_pixel = evidence;
     std::vector<std::uint64_t> frames;
     for (std::uint64_t frame = 0; frame < 31; ++frame)
-      if (wants_recovery(options, object, frame)) frames.push_back(frame);
+      if (wants_recovery(options, object, 5.0, frame)) frames.push_back(frame);
     return frames;
   };
   EXPECT_THAT(turns(4, 1.0), testing::ElementsAre(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30));
@@ -51,6 +53,8 @@ TEST(WantsRecovery, CountsTurnsByHand) {
   EXPECT_THAT(turns(3, 0.74), testing::ElementsAre(0, 10, 20, 30));
   EXPECT_THAT(turns(3, 0.75), testing::IsEmpty());
   EXPECT_THAT(turns(0, 1.0), testing::IsEmpty());
+  EXPECT_THAT(turns(0, 1.0, 3.9), testing::ElementsAre(0, 10, 20, 30));
+  EXPECT_THAT(turns(0, 1.0, 4.1), testing::IsEmpty());
   options.recover_every = 0;  // as often as can be
   EXPECT_EQ(turns(4, 1.0).size(), 31u);
 }

@@ -26,6 +26,9 @@ struct AugmentOptions {
   /// share. If less than this share of a tracked object's pixels supports it, its pose may be wrong, and the object is
   /// looked for, too. Range 0 to 1. Chosen.
   double suspicious_share = 0.75;
+  /// share. The same if its evidence is less than this share of what its pose would say if it were right. Range 0 to 1.
+  /// Measured: docs/studies/tracking.md.
+  double short_share = 0.8;
   /// frames. The search for such an object is repeated after this many frames. Range 1 to 100. Chosen.
   int suspicious_every = 10;
   /// count. A search starts from this many poses. Range 8 to 1000. Chosen.
@@ -95,8 +98,10 @@ bool are_exchanged(const std::array<const rendering::FrameTerms*, 2>& terms,
 /// Gives each the other's place, motion and state; names, models, colours, existence and physical parameters stay.
 void exchange(belief::ObjectBelief& first, belief::ObjectBelief& second);
 
-/// Whether an object is to be looked for in the frame of this number.
-bool wants_recovery(const AugmentOptions& options, const belief::ObjectBelief& object, std::uint64_t frame);
+/// Whether an object is to be looked for in the frame of this number. `expected_evidence`: nats per pixel that its pose
+/// would say if it were right (WeightReport).
+bool wants_recovery(const AugmentOptions& options, const belief::ObjectBelief& object, double expected_evidence,
+                    std::uint64_t frame);
 
 /// Points in C of measured pixels that nothing known explains, row-major: those `tolerance` (m) or more in front of
 /// what the frame expects there without the objects, and those where it expects nothing.
