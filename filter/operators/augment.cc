@@ -161,7 +161,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;
   // More of an arm that no scene knows may look like the object than is seen of it in that arm's hand. But what is seen
   // where it is believed to be cannot be out of reach of there.
-  if (far && unseen == 0.0 && is_seen_there(X_CO, current, terms, target, options, weighting, tools)) return false;
+  if (far && is_seen_there(X_CO, current, terms, target, options, weighting, tools)) return false;
   const double needed = options.accept_evidence + (far ? options.far_evidence : 0.0);
   // Far from where it was, what is seen has to speak for itself.
   const double scale =

@@ -216,6 +216,9 @@ TEST_F(ABox, WhatIsSeenIsNotOutOfReachOfThereHoweverMuchLooksLikeIt) {
   ASSERT_GT(evidence_of(X_WO_).log_ratio, AugmentOptions().accept_log_ratio);
   ObjectBelief just_seen = believed_at(X_WO_, frame_.stamp_ns);
   EXPECT_FALSE(recovered(just_seen));
+  // Nor after a frame in which it was not seen.
+  ObjectBelief missed = believed_at(X_WO_, frame_.stamp_ns - 33'000'000);
+  EXPECT_FALSE(recovered(missed));
   // Where nothing like it is seen, it may have been wrong all along.
   ObjectBelief wrong = believed_at(Pose::from_translation({0.2, -0.05, 0.09}), frame_.stamp_ns);
   EXPECT_TRUE(recovered(wrong));
