@@ -48,6 +48,9 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
                         .was_unseen = was_unseen_by(seen, step.observation.camera),
                         .depth = step.observation.frame.depth.get(),
                         .camera = step.observation.frame.camera};
+  const auto& color = step.observation.frame.color;
+  if (color && color->width() == context.camera.width && color->height() == context.camera.height)
+    context.color = color.get();
   if (worlds != nullptr) {
     context.terms_of = worlds->terms_of;
     context.weight_pixels = worlds->pixels;

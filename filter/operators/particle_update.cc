@@ -53,6 +53,13 @@ double outline_at(const rendering::FrameTerms& terms, const SearchTarget& target
                          OutlineHoles::kMayEnd);
 }
 
+Outline outline_of(const SearchTarget& target, const Pose& X_CO, const rendering::FrameTerms& terms,
+                   const WeightContext& context, const FilterTools& tools) {
+  Outline outline(target, X_CO, context.camera, *tools.renderer);
+  if (context.color != nullptr) outline.see_colors(X_CO, *context.depth, *context.color, terms);
+  return outline;
+}
+
 double worth(double log_ratio, double outline, const WeightOptions& options) {
   return log_ratio > 0.0 ? outline_worth(outline, options) * log_ratio : log_ratio;
 }
@@ -145,7 +152,7 @@ FrameEquations ParticleUpdate::equations_at(const Pose& X_WO, double gate, const
   without_facets(target_.facet_lever, X_CO.rotation, target_.centre(), H, g);
   FrameEquations equations;
   if (outline != nullptr) {
-    const OutlineEquations edges = outline->linearise(X_CO, *context_.depth, terms_);
+    const OutlineEquations edges = outline->linearise(X_CO, *context_.depth, terms_, context_.color);
     H += edges.H;
     g += edges.g;
   }
@@ -161,7 +168,7 @@ const Outline* ParticleUpdate::outline_near(const Pose& X_WO, std::optional<Outl
   if (shared_outline_ != nullptr &&
       is_near(geometry::box_minus(X_WO, shared_outline_->X_WO), kSharedShift, kSharedTurn))
     return &shared_outline_->outline;
-  return &own.emplace(target_, X_CW_ * X_WO, context_.camera, *tools_.renderer);
+  return &own.emplace(outline_of(target_, X_CW_ * X_WO, terms_, context_, tools_));
 }
 
 rendering::PoseEvidence ParticleUpdate::evidence(const Pose& X_WO) const {

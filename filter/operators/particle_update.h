@@ -60,6 +60,10 @@ bool within_reach(const Mode& mode, const Gaussian& predicted, double dt, const 
 rendering::PoseEvidence evidence_of(const rendering::FrameTerms& terms, const rendering::PoseHypothesis& hypothesis,
                                     const FilterTools& tools);
 
+/// The outline at a pose, with its colours where the context has a colour image. The context has a depth image.
+Outline outline_of(const SearchTarget& target, const Pose& X_CO, const rendering::FrameTerms& terms,
+                   const WeightContext& context, const FilterTools& tools);
+
 /// An outline and the pose that it was taken at.
 struct TakenOutline {
   Pose X_WO;

@@ -140,7 +140,8 @@ WeightReport weight(const rendering::FrameTerms& terms, const SearchTarget& targ
   const double pixels = tempering_pixels(terms_of(static_cast<std::size_t>(best)), target, X_CW * X_WO_best, tools);
   std::optional<TakenOutline> outline;
   if (context.depth != nullptr && !is_see_through(target)) {
-    outline.emplace(TakenOutline{X_WO_best, Outline(target, X_CW * X_WO_best, context.camera, *tools.renderer)});
+    outline.emplace(TakenOutline{
+        X_WO_best, outline_of(target, X_CW * X_WO_best, terms_of(static_cast<std::size_t>(best)), context, tools)});
   }
   const StillGroups groups = still_groups_of(particles, context.terms_of);
   // The likeliest group comes first: while the object lies still, all that is near is compared by what it finds.

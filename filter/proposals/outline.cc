@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
+#include "edge_colors.h"
 #include "prescene/filter/proposals/facets.h"
 
 namespace prescene::filter {
@@ -20,7 +22,6 @@ constexpr double kLeastReach = 4.0;      // ... and in pixels
 constexpr double kMostReach = 16.0;
 constexpr double kTolerance = 0.010;       // m beyond three standard deviations: what still is the object's surface
 constexpr double kKnownTolerance = 0.012;  // m; a measurement so near to a known surface shows that
-constexpr double kLogOdds = 1.1;           // nats a pixel; less than its reliability, as neighbours err together
 constexpr double kEdgeSigma = 3.0;         // pixels, error of a depth camera's edges
 constexpr double kIndependent = 10.0;      // pixels along the outline that share an error
 constexpr double kDirectionError = 0.15;   // rad, of the directions across a drawn outline
@@ -38,17 +39,46 @@ geometry::PinholeCamera close_up(const geometry::PinholeCamera& camera, const Ve
   return picture;
 }
 
-/// What one pixel of a line shows.
-enum class Seen : std::int8_t { kNothing, kObject, kBackground };
+constexpr auto kMostPixels = 2 * static_cast<std::size_t>(kMostReach) + 1;
 
-/// exp(-n kLogOdds) for all n that a line can have.
-const std::array<double, 2 * static_cast<std::size_t>(kMostReach) + 2>& powers() {
+/// exp(-n kLogOdds / kParts) for all n that a line can have, by depth and colour.
+const std::array<double, 2 * kParts * kMostPixels + 1>& powers() {
   static const auto kPowers = [] {
-    std::array<double, 2 * static_cast<std::size_t>(kMostReach) + 2> table{};
-    for (std::size_t n = 0; n < table.size(); ++n) table[n] = std::exp(-static_cast<double>(n) * kLogOdds);
+    std::array<double, 2 * kParts * kMostPixels + 1> table{};
+    for (std::size_t n = 0; n < table.size(); ++n) table[n] = std::exp(-static_cast<double>(n) * kLogOdds / kParts);
     return table;
   }();
   return kPowers;
+}
+
+/// Where a line of pixels crosses from the object to what is around it, in pixels from its middle.
+struct Crossing {
+  double mean = 0.0;
+  double variance = 0.0;
+};
+
+/// The posterior of that; `scores`: for each pixel, how much likelier it is the object's than not, in kParts of
+/// kLogOdds.
+Crossing crossing_of(std::span<const int> scores) {
+  const auto& power = powers();
+  std::array<int, kMostPixels + 1> sums;
+  int sum = 0, largest = 0;
+  sums[0] = 0;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    sum += scores[i];
+    sums[i + 1] = sum;
+    largest = std::max(largest, sum);
+  }
+  double total = 0.0, mean = 0.0, square = 0.0;
+  for (std::size_t i = 0; i <= scores.size(); ++i) {
+    const double w = power[static_cast<std::size_t>(largest - sums[i])];
+    const double at = static_cast<double>(i) - 0.5 * static_cast<double>(scores.size());
+    total += w;
+    mean += w * at;
+    square += w * at * at;
+  }
+  mean /= total;
+  return {mean, square / total - mean * mean};
 }
 
 }  // namespace
@@ -88,8 +118,13 @@ Outline::Outline(const SearchTarget& target, const Pose& X_CO, const geometry::P
       const Vector3d edge = picture.unproject(x + 0.5 * outwards.x(), y + 0.5 * outwards.y(), z);
       Vector3d inner = picture.unproject(x - kInwards * outwards.x(), y - kInwards * outwards.y(), z);
       if (covered(inner_x, inner_y)) inner = picture.unproject(inner_x, inner_y, depth(inner_x, inner_y));
+      int inside = 1;
+      while (covered(x - static_cast<int>(std::lround(inside * outwards.x())),
+                     y - static_cast<int>(std::lround(inside * outwards.y()))))
+        ++inside;
       const Vector3d across(outwards.x() / picture.fx, outwards.y() / picture.fy, 0.0);
-      points.push_back({X_OC * edge, X_OC.rotation * (inner - edge), X_OC.rotation * across.normalized()});
+      points.push_back({X_OC * edge, X_OC.rotation * (inner - edge), X_OC.rotation * across.normalized(),
+                        static_cast<double>(inside) / picture.fx});
     }
   const std::size_t stride = (points.size() + kMostPoints - 1) / kMostPoints;
   for (std::size_t i = 0; i < points.size(); i += std::max<std::size_t>(1, stride)) points_.push_back(points[i]);
@@ -100,88 +135,133 @@ Outline::Outline(const SearchTarget& target, const Pose& X_CO, const geometry::P
   p_OQ_ = target.centre();
 }
 
-OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage& depth,
-                                    const rendering::FrameTerms& terms) const {
-  OutlineEquations equations;
-  const auto& power = powers();
-  const geometry::Matrix3d R_CO = X_CO.rotation.toRotationMatrix();
-  for (const Point& point : points_) {
-    const Vector3d p = R_CO * point.p_O + X_CO.translation;
-    if (!(p.z() > 0.05)) continue;
-    const Vector3d inwards = R_CO * point.inwards_O;
-    const Vector3d outwards = R_CO * point.outwards_O;
-    const Vector2d u = camera_.project(p);
-    // The image's direction of a small step outwards.
-    Vector2d n(camera_.fx * (outwards.x() - p.x() / p.z() * outwards.z()),
-               camera_.fy * (outwards.y() - p.y() / p.z() * outwards.z()));
-    if (!(n.norm() > 0.0)) continue;
-    n.normalize();
-    const int reach = static_cast<int>(std::clamp(kReach * camera_.fx / p.z(), kLeastReach, kMostReach));
-    // How the depth changes along the line on the object's side, per pixel.
-    const double inner_px = (camera_.project(p + inwards) - u).norm();
-    const double slope = inner_px > 0.5 ? inwards.z() / inner_px : 0.0;
-    const double tolerance = kTolerance + 3.0 * terms.model.hit_sigma(p.z(), 1.0);
+std::optional<Outline::Line> Outline::line_at(const Point& point, const Pose& X_CO,
+                                              const rendering::FrameTerms& terms) const {
+  Line line;
+  line.p = X_CO * point.p_O;
+  if (!(line.p.z() > 0.05)) return std::nullopt;
+  const Vector3d inwards = X_CO.rotation * point.inwards_O;
+  const Vector3d outwards = X_CO.rotation * point.outwards_O;
+  line.u = camera_.project(line.p);
+  // The image's direction of a small step outwards.
+  line.n = {camera_.fx * (outwards.x() - line.p.x() / line.p.z() * outwards.z()),
+            camera_.fy * (outwards.y() - line.p.y() / line.p.z() * outwards.z())};
+  if (!(line.n.norm() > 0.0)) return std::nullopt;
+  line.n.normalize();
+  line.reach = static_cast<int>(std::clamp(kReach * camera_.fx / line.p.z(), kLeastReach, kMostReach));
+  const double inner_px = (camera_.project(line.p + inwards) - line.u).norm();
+  line.slope = inner_px > 0.5 ? inwards.z() / inner_px : 0.0;
+  line.tolerance = kTolerance + 3.0 * terms.model.hit_sigma(line.p.z(), 1.0);
+  return line;
+}
 
-    std::array<Seen, 2 * static_cast<std::size_t>(kMostReach) + 1> line;
-    int objects = 0, backgrounds = 0;
-    for (int s = -reach; s <= reach; ++s) {
-      Seen& seen = line[static_cast<std::size_t>(s + reach)];
-      seen = Seen::kNothing;
-      const int x = static_cast<int>(std::lround(u.x() + s * n.x()));
-      const int y = static_cast<int>(std::lround(u.y() + s * n.y()));
-      if (x < 0 || y < 0 || x >= depth.width() || y >= depth.height()) continue;
-      const double z = depth(x, y);
-      if (!(z > 0.0)) continue;
-      const int low_x = std::min(x / terms.step, terms.camera.width - 1);
-      const int low_y = std::min(y / terms.step, terms.camera.height - 1);
-      const double known = terms.known.empty() ? 0.0 : static_cast<double>(terms.known(low_x, low_y));
-      const double peak = terms.absent_peak(low_x, low_y);
-      const double expected = p.z() + std::max(0, -s) * slope;
-      const bool is_object = std::abs(z - expected) < tolerance;
-      const bool is_known = (known > 0.0 && std::abs(z - known) < kKnownTolerance) ||
-                            (peak > 0.0 && std::abs(z - peak) < kKnownTolerance);
-      if (is_object == is_known) {
-        // Both say nothing of where one ends; neither is something nearer, or what is behind.
-        if (!is_object && z > expected) seen = Seen::kBackground;
-      } else {
-        seen = is_object ? Seen::kObject : (z > expected - tolerance ? Seen::kBackground : Seen::kNothing);
+bool Outline::is_nearer(const Line& line, int s, double z) {
+  return z > 0.0 && z < line.p.z() + std::max(0, -s) * line.slope - line.tolerance;
+}
+
+Outline::Seen Outline::seen_at(const Line& line, int s, int x, int y, double z, const rendering::FrameTerms& terms) {
+  const int low_x = std::min(x / terms.step, terms.camera.width - 1);
+  const int low_y = std::min(y / terms.step, terms.camera.height - 1);
+  const double known = terms.known.empty() ? 0.0 : static_cast<double>(terms.known(low_x, low_y));
+  const double peak = terms.absent_peak(low_x, low_y);
+  const double expected = line.p.z() + std::max(0, -s) * line.slope;
+  const bool is_object = std::abs(z - expected) < line.tolerance;
+  const bool is_known =
+      (known > 0.0 && std::abs(z - known) < kKnownTolerance) || (peak > 0.0 && std::abs(z - peak) < kKnownTolerance);
+  // Both say nothing of where one ends; neither is something nearer, or what is behind.
+  if (is_object == is_known) return !is_object && z > expected ? Seen::kBackground : Seen::kNothing;
+  if (is_object) return Seen::kObject;
+  return z > expected - line.tolerance ? Seen::kBackground : Seen::kNothing;
+}
+
+void Outline::see_colors(const Pose& X_CO, const geometry::DepthImage& depth, const geometry::ColorImage& color,
+                         const rendering::FrameTerms& terms) {
+  // Calls `see` for the pixels of a line on either side of where the edge may be.
+  const auto beside = [&](const Point& point, const Line& line, const auto& see) {
+    const int inner = std::min(line.reach, static_cast<int>(0.5 * point.width * camera_.fx));
+    const int innermost = std::min(2 * line.reach, static_cast<int>(point.width * camera_.fx));
+    const auto see_from = [&](int first, int last, bool is_inside) {
+      for (int s = first; s <= last; ++s) {
+        const auto at = line.pixel(s);
+        if (at.x() < 0 || at.y() < 0 || at.x() >= color.width() || at.y() >= color.height()) continue;
+        if (!is_nearer(line, s, depth(at.x(), at.y()))) see(color(at.x(), at.y()), is_inside);
       }
+    };
+    see_from(-innermost, -inner - 1, true);
+    see_from(line.reach + 1, 2 * line.reach, false);
+  };
+  std::vector<std::optional<Line>> lines;
+  auto colors = std::make_shared<EdgeColors>();
+  for (const Point& point : points_) {
+    lines.push_back(line_at(point, X_CO, terms));
+    if (lines.back())
+      beside(point, *lines.back(), [&](const geometry::Rgb& c, bool is_inside) { colors->add(c, is_inside); });
+  }
+  if (!colors->finish()) return;
+  // A face may look like what is around the object, and another one like no other part of it.
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    points_[i].contrast = 0.0;
+    if (!lines[i]) continue;
+    std::array<int, 2> sums{}, pixels{};
+    beside(points_[i], *lines[i], [&](const geometry::Rgb& c, bool is_inside) {
+      sums[is_inside ? 1 : 0] += colors->score(c);
+      ++pixels[is_inside ? 1 : 0];
+    });
+    if (pixels[0] == 0 || pixels[1] == 0) continue;
+    const double least = std::min(static_cast<double>(sums[1]) / pixels[1], -static_cast<double>(sums[0]) / pixels[0]);
+    points_[i].contrast = std::max(0.0, least / kParts);
+  }
+  colors_ = std::move(colors);
+}
+
+OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage& depth,
+                                    const rendering::FrameTerms& terms, const geometry::ColorImage* color) const {
+  OutlineEquations equations;
+  const geometry::Matrix3d R_OC = X_CO.rotation.conjugate().toRotationMatrix();
+  std::array<int, kMostPixels> scores, by_color;
+  const bool has_colors = colors_ && color != nullptr;
+  for (const Point& point : points_) {
+    const auto line = line_at(point, X_CO, terms);
+    if (!line) continue;
+    const auto pixels = static_cast<std::size_t>(2 * line->reach + 1);
+    scores.fill(0);
+    by_color.fill(0);
+    int objects = 0, backgrounds = 0;
+    for (int s = -line->reach; s <= line->reach; ++s) {
+      const auto at = line->pixel(s);
+      if (at.x() < 0 || at.y() < 0 || at.x() >= depth.width() || at.y() >= depth.height()) continue;
+      const double z = depth(at.x(), at.y());
+      const auto i = static_cast<std::size_t>(s + line->reach);
+      if (has_colors && !is_nearer(*line, s, z)) by_color[i] = colors_->score((*color)(at.x(), at.y()));
+      if (!(z > 0.0)) continue;
+      const Seen seen = seen_at(*line, s, at.x(), at.y(), z, terms);
       objects += seen == Seen::kObject;
       backgrounds += seen == Seen::kBackground;
+      scores[i] = seen == Seen::kObject ? kParts : seen == Seen::kBackground ? -kParts : 0;
     }
-    if (objects < kFewestSeen || backgrounds < kFewestSeen) continue;
-
-    // The posterior of where it ends: object on this side, background on that. Scores are in units of kLogOdds.
-    std::array<int, 2 * static_cast<std::size_t>(kMostReach) + 2> scores;
-    int score = backgrounds;
-    int largest = score;
-    scores[0] = score;
-    const int ends = 2 * reach + 2;
-    for (int i = 1; i < ends; ++i) {
-      const Seen seen = line[static_cast<std::size_t>(i - 1)];
-      score += (seen == Seen::kObject ? 1 : 0) - (seen == Seen::kBackground ? 1 : 0);
-      scores[static_cast<std::size_t>(i)] = score;
-      largest = std::max(largest, score);
-    }
-    double sum = 0.0, mean = 0.0, square = 0.0;
-    for (int i = 0; i < ends; ++i) {
-      const double w = power[static_cast<std::size_t>(largest - scores[static_cast<std::size_t>(i)])];
-      const double at = i - reach - 0.5;
-      sum += w;
-      mean += w * at;
-      square += w * at * at;
-    }
-    mean /= sum;
-    const double variance = square / sum - mean * mean + kEdgeSigma * kEdgeSigma;
-    const double scaled = mean / (3.0 * kEdgeSigma);
-    const double weight = share_ / variance / ((1.0 + scaled * scaled) * (1.0 + scaled * scaled));
-    const Vector3d a(camera_.fx * n.x() / p.z(), camera_.fy * n.y() / p.z(),
-                     -(camera_.fx * n.x() * p.x() + camera_.fy * n.y() * p.y()) / (p.z() * p.z()));
+    const Vector3d a(camera_.fx * line->n.x() / line->p.z(), camera_.fy * line->n.y() / line->p.z(),
+                     -(camera_.fx * line->n.x() * line->p.x() + camera_.fy * line->n.y() * line->p.y()) /
+                         (line->p.z() * line->p.z()));
+    const Vector3d a_O = R_OC * a;
     Vector6d row;
-    row << point.p_O.cross(R_CO.transpose() * a), a;
-    equations.H += weight * row * row.transpose();
-    equations.g += weight * mean * row;
-    ++equations.points;
+    row << point.p_O.cross(a_O), a;
+    const auto add = [&](const Crossing& crossing, double share) {
+      const double variance = crossing.variance + kEdgeSigma * kEdgeSigma;
+      const double scaled = crossing.mean / (3.0 * kEdgeSigma);
+      const double weight = share * share_ / variance / ((1.0 + scaled * scaled) * (1.0 + scaled * scaled));
+      equations.H += weight * row * row.transpose();
+      equations.g += weight * crossing.mean * row;
+      ++equations.points;
+    };
+    if (has_colors && point.contrast > 0.0) {
+      for (std::size_t i = 0; i < pixels; ++i) scores[i] += static_cast<int>(std::lround(point.contrast * by_color[i]));
+      const Crossing crossing = crossing_of(std::span(scores).first(pixels));
+      // What a line of which nothing is known has as its variance is no news.
+      const double unknown = (static_cast<double>((pixels + 1) * (pixels + 1)) - 1.0) / 12.0;
+      if (crossing.variance < unknown) add(crossing, 1.0 - crossing.variance / unknown);
+    } else if (objects >= kFewestSeen && backgrounds >= kFewestSeen) {
+      add(crossing_of(std::span(scores).first(pixels)), 1.0);
+    }
   }
   without_facets(lever_, X_CO.rotation, p_OQ_, equations.H, equations.g);
   return equations;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -26,8 +27,30 @@ class OutlineOfAThing : public ::testing::Test {
   }
 
   OutlineEquations equations_at(const Pose& X_CO) const {
-    const Outline outline(target_, X_CO, observation_.frame.camera, *backends_.renderer);
-    return outline.linearise(X_CO, *observation_.frame.depth, frame_.terms);
+    Outline outline(target_, X_CO, observation_.frame.camera, *backends_.renderer);
+    const geometry::ColorImage* color = observation_.frame.color.get();
+    if (color != nullptr) outline.see_colors(X_CO, *observation_.frame.depth, *color, frame_.terms);
+    return outline.linearise(X_CO, *observation_.frame.depth, frame_.terms, color);
+  }
+
+  void see_no_colors() { observation_.frame.color.reset(); }
+  void see_no_depth() {
+    observation_.frame.depth =
+        std::make_shared<const geometry::DepthImage>(observation_.frame.camera.width, observation_.frame.camera.height);
+  }
+  /// Gives the picture one colour where the object is, another elsewhere, and noise.
+  void paint(const geometry::Rgb& object, const geometry::Rgb& around) {
+    const geometry::PinholeCamera& camera = observation_.frame.camera;
+    const geometry::DepthImage drawn = depth_of(target_, X_CO_, camera, *backends_.renderer);
+    geometry::ColorImage color(camera.width, camera.height);
+    core::RandomStream stream(3, core::Purpose::kTest);
+    for (int y = 0; y < camera.height; ++y)
+      for (int x = 0; x < camera.width; ++x)
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double mean = (drawn(x, y) > 0.0F ? object : around)[c];
+          color(x, y)[c] = static_cast<std::uint8_t>(std::clamp(mean + 6.0 * stream.normal(), 0.0, 255.0));
+        }
+    observation_.frame.color = std::make_shared<const geometry::ColorImage>(std::move(color));
   }
 
   /// Some Gauss-Newton steps across the line of sight on the outline alone.
@@ -51,6 +74,7 @@ class OutlineOfAThing : public ::testing::Test {
 TEST_F(OutlineOfAThing, BringsBackWhatSlidAlongItsFaces) {
   const Pose X_WO{geometry::exp_rotation({0.0, 0.0, 0.4}), {0.02, -0.03, 0.09}};
   see(box_model("box", {0.06, 0.10, 0.18}), X_WO);
+  see_no_colors();
   // Across the line of sight.
   for (const Vector3d& shift : {Vector3d(0.010, 0.0, 0.0), Vector3d(-0.010, 0.0, 0.0), Vector3d(0.0, -0.010, 0.0)}) {
     Pose off = X_CO_;
@@ -75,10 +99,41 @@ TEST_F(OutlineOfAThing, SaysNothingOfATurnAboutACansAxisAndMuchOfItsTilt) {
   EXPECT_LT(e.H(2, 2), 0.1 * std::max(e.H(0, 0), e.H(1, 1)));
 }
 
+TEST_F(OutlineOfAThing, ColoursAloneBringBackWhatSlid) {
+  const Pose X_WO{geometry::exp_rotation({0.0, 0.0, 0.4}), {0.02, -0.03, 0.09}};
+  see(box_model("box", {0.06, 0.10, 0.18}), X_WO);
+  paint({150, 60, 60}, {110, 90, 70});
+  see_no_depth();
+  for (const Vector3d& shift : {Vector3d(0.010, 0.0, 0.0), Vector3d(-0.010, 0.0, 0.0), Vector3d(0.0, -0.010, 0.0)}) {
+    Pose off = X_CO_;
+    off.translation += shift;
+    const Pose back = followed(off);
+    EXPECT_LT((back.translation - X_CO_.translation).head<2>().norm(), 0.002) << shift.transpose();
+  }
+}
+
+TEST_F(OutlineOfAThing, ColoursThatAreAlikeSayNothing) {
+  see(box_model("box", {0.06, 0.10, 0.18}), {geometry::Quaterniond::Identity(), {0.0, 0.0, 0.09}});
+  see_no_depth();
+  paint({150, 60, 60}, {110, 90, 70});
+  const double with_colors = equations_at(X_CO_).H.trace();
+  paint({110, 90, 70}, {110, 90, 70});
+  EXPECT_LT(equations_at(X_CO_).H.trace(), 0.05 * with_colors);
+}
+
+// Whose edges are not the object's.
+TEST_F(OutlineOfAThing, ColoursOfSomethingNearerDoNotCount) {
+  see(box_model("box", {0.06, 0.10, 0.18}), {geometry::Quaterniond::Identity(), {0.0, 0.0, 0.09}});
+  paint({150, 60, 60}, {110, 90, 70});
+  observation_.frame.depth = std::make_shared<const geometry::DepthImage>(observation_.frame.camera.width,
+                                                                          observation_.frame.camera.height, 0.2F);
+  EXPECT_TRUE(equations_at(X_CO_).H.isZero());
+}
+
 TEST_F(OutlineOfAThing, SeesNoEdgeInAnEmptyImage) {
   see(box_model("box", {0.06, 0.10, 0.18}), {geometry::Quaterniond::Identity(), {0.0, 0.0, 0.09}});
-  observation_.frame.depth =
-      std::make_shared<const geometry::DepthImage>(observation_.frame.camera.width, observation_.frame.camera.height);
+  see_no_colors();
+  see_no_depth();
   const OutlineEquations e = equations_at(X_CO_);
   EXPECT_EQ(e.points, 0);
   EXPECT_TRUE(e.H.isZero());

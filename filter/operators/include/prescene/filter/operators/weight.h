@@ -57,6 +57,8 @@ struct WeightContext {
   /// The full depth image and its camera, for where the object ends in it; null = poses follow depth residuals alone.
   const geometry::DepthImage* depth = nullptr;
   geometry::PinholeCamera camera = {};
+  /// The colour image of the same camera and size, for the same; null = depth alone says it.
+  const geometry::ColorImage* color = nullptr;
   /// By particle, the frame with what hides it in its world put in; empty = the same for all.
   std::span<const rendering::FrameTerms* const> terms_of = {};
   /// Number of pixels that weights are tempered by, for all members of worlds alike; 0 = the object's own.
