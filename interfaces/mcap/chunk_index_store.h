@@ -23,6 +23,7 @@ class ChunkIndexStore {
   /// kUnavailable where the file can't be made or written; errors speak of the recording. Where memory ends, the
   /// exception is passed on and nothing was added.
   core::Status add(const mcap_records::ChunkIndex& index);
+  std::uint64_t bytes() const { return in_file_ + newest_.size(); }
   /// Hands over all bytes in their order.
   core::Status read(const std::function<core::Status(std::span<const std::uint8_t>)>& take);
 

@@ -362,6 +362,10 @@ Status McapWriter::flush_by(std::int64_t log_time_ns) {
   return impl.end_chunk();
 }
 
+McapWriter::Size McapWriter::size() const {
+  return {impl_->position, impl_->chunk_indexes.bytes(), impl_->statistics.chunk_count};
+}
+
 double McapWriter::seconds_at_risk() const { return impl_->sync ? impl_->sync->seconds_at_risk() : 0.0; }
 
 Status McapWriter::close() {

@@ -56,6 +56,13 @@ class McapWriter {
   /// The same if the chunk's earliest message is chunk_ns or more before this log time. What came last is otherwise
   /// kept back until the next message comes.
   core::Status flush_by(std::int64_t log_time_ns);
+  /// How large the recording is by now; a reader's limits are those of McapReader.
+  struct Size {
+    std::uint64_t bytes = 0;        ///< In the file: without the chunk that is not closed, and the index.
+    std::uint64_t index_bytes = 0;  ///< That the index of the chunks will take.
+    std::uint64_t chunks = 0;
+  };
+  Size size() const;
   /// How long ago the oldest of what was handed over and is not known to be on the disk was, s; 0 without
   /// sync_interval.
   double seconds_at_risk() const;
