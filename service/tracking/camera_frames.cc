@@ -208,6 +208,22 @@ std::optional<AssembledFrame> CameraFrames::take_recorded(int camera, MessageInd
   return frame;
 }
 
+void CameraFrames::resume_after(int camera, MessageIndex depth, core::TimeNs now_ns) {
+  const auto number = static_cast<std::size_t>(camera);
+  if (camera < 0 || number >= cameras_.size()) return;
+  const std::optional<FrameAssembler::DepthTimes> times = cameras_[number].assembler.waiting(depth);
+  std::optional<AssembledFrame> frame = cameras_[number].assembler.take_recorded(depth, now_ns);
+  if (frame && cameras_.size() > 1) note_used(number, *times, *frame);
+  static_cast<void>(take_skipped());
+}
+
+std::optional<MessageIndex> CameraFrames::oldest_needed() const {
+  std::optional<MessageIndex> oldest;
+  for (const Camera& camera : cameras_)
+    if (const auto needed = camera.assembler.oldest_needed()) oldest = oldest ? std::min(*oldest, *needed) : needed;
+  return oldest;
+}
+
 std::optional<FrameAssembler::DepthTimes> CameraFrames::offer(std::size_t camera, core::TimeNs now_ns) {
   Camera& mine = cameras_[camera];
   for (;;) {

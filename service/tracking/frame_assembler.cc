@@ -272,7 +272,7 @@ std::optional<AssembledFrame> FrameAssembler::finish(std::size_t index, Assemble
         (is_lens ? " in its lens" : " from " + text_of(last_taken_->camera) + " to " + text_of(*camera_)) +
         ": the new one is used; if the camera was not set otherwise, two nodes publish it");
   }
-  last_taken_ = Taken{taken.stamp_ns, taken.received_ns, *camera_, lens_};
+  last_taken_ = Taken{taken.index, taken.stamp_ns, taken.received_ns, *camera_, lens_};
   for (std::size_t older = 0; older < index; ++older) skip(waiting_[older], "a newer frame was ready");
   waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(index + 1));
   // Last, as it needs memory: the frame is gone even if there is none.
@@ -330,6 +330,17 @@ std::optional<AssembledFrame> FrameAssembler::take_recorded(MessageIndex depth, 
   Attempt attempt = assemble(*found, is_out_of_time(*found, now_ns));
   if (!attempt.frame) return std::nullopt;
   return finish(static_cast<std::size_t>(found - waiting_.begin()), *std::move(attempt.frame));
+}
+
+std::optional<MessageIndex> FrameAssembler::oldest_needed() const {
+  std::optional<MessageIndex> oldest;
+  const auto need = [&oldest](MessageIndex index) { oldest = oldest ? std::min(*oldest, index) : index; };
+  if (last_taken_) need(last_taken_->index);
+  for (const Waiting& waiting : waiting_) need(waiting.index);
+  for (const Color& color : colors_)
+    if (!last_taken_ || color.stamp_ns >= last_taken_->stamp_ns - core::ns_of(settings_.max_stamp_difference_s))
+      need(color.index);
+  return oldest;
 }
 
 bool FrameAssembler::has_waiting(core::TimeNs from_ns, core::TimeNs before_ns) const {

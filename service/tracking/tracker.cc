@@ -133,6 +133,16 @@ std::optional<TrackerStep> Tracker::repeat(const StepRecord& recorded) {
   return frame ? std::optional(step_with(*std::move(frame), recorded.now_ns)) : std::nullopt;
 }
 
+void Tracker::resume(const TrackerSnapshot& snapshot) {
+  for (const TrackerSnapshot::Taken& frame : snapshot.taken)
+    frames_.resume_after(frame.camera, frame.depth, frame.at_ns);
+  controls_ = snapshot.controls;
+  taken_ = snapshot.taken;
+  filter_.measure_cameras_anew();
+  const std::lock_guard lock(mutex_);
+  belief_ = snapshot.belief;
+}
+
 TrackerStep Tracker::step_with(AssembledFrame frame, core::TimeNs now_ns) {
   const core::Stopwatch watch;
   const core::TimeNs stamp_ns = frame.observation.stamp_ns;
@@ -190,6 +200,8 @@ TrackerStep Tracker::step_with(AssembledFrame frame, core::TimeNs now_ns) {
     belief_ = std::move(next);
   }
   controls_ = std::move(controls);
+  std::erase_if(taken_, [&](const auto& earlier) { return earlier.camera == step.record.camera; });
+  taken_.push_back({step.record.camera, step.record.depth, time_at(now_ns)});
   step.record.seconds = watch.seconds();
   return step;
 }

@@ -193,6 +193,46 @@ void WaitingControls::forget_due(core::TimeNs end_ns) {
   std::erase_if(waiting_, [&](const Waiting& waiting) { return waiting.due_ns <= end_ns; });
 }
 
+nlohmann::ordered_json WaitingControls::to_json() const {
+  nlohmann::ordered_json waiting = nlohmann::ordered_json::array();
+  for (const Waiting& action : waiting_) {
+    nlohmann::ordered_json& row = waiting.emplace_back();
+    row["due_ns"] = action.due_ns;
+    row["after_ns"] = action.after_ns;
+    if (action.stamp_ns) row["stamp_ns"] = *action.stamp_ns;
+    row["sent_ns"] = action.sent_ns;
+    row["action"] = belief::to_json(action.action);
+    row["ends_place"] = action.ends_place;
+  }
+  return {{"waiting", std::move(waiting)}, {"dropped", dropped_}, {"restarts", restarts_}};
+}
+
+core::Result<WaitingControls> WaitingControls::from_json(const nlohmann::ordered_json& json) {
+  WaitingControls controls;
+  const auto bad = [](const std::string& key) { return core::invalid_input("controls: no good '" + key + "'"); };
+  const auto time_at = [](const nlohmann::ordered_json& row, const char* key) -> std::optional<core::TimeNs> {
+    const auto found = row.find(key);
+    if (found == row.end() || !found->is_number_integer()) return std::nullopt;
+    return found->get<core::TimeNs>();
+  };
+  if (!json.is_object() || !json.contains("waiting") || !json["waiting"].is_array()) return bad("waiting");
+  if (!json.contains("dropped") || !json["dropped"].is_number_unsigned()) return bad("dropped");
+  if (!json.contains("restarts") || !json["restarts"].is_boolean()) return bad("restarts");
+  controls.dropped_ = json["dropped"].get<std::uint64_t>();
+  controls.restarts_ = json["restarts"].get<bool>();
+  if (json["waiting"].size() > kMaxControls) return bad("waiting");
+  for (const nlohmann::ordered_json& row : json["waiting"]) {
+    if (!row.is_object() || !row.contains("action")) return bad("action");
+    if (!row.contains("ends_place") || !row["ends_place"].is_boolean()) return bad("ends_place");
+    const auto due_ns = time_at(row, "due_ns"), after_ns = time_at(row, "after_ns"), sent_ns = time_at(row, "sent_ns");
+    if (!due_ns || !after_ns || !sent_ns) return bad(!due_ns ? "due_ns" : !after_ns ? "after_ns" : "sent_ns");
+    PRESCENE_TRY(belief::Action action, belief::action_from_json(row["action"]));
+    controls.waiting_.push_back(
+        {*due_ns, *after_ns, time_at(row, "stamp_ns"), *sent_ns, std::move(action), row["ends_place"].get<bool>()});
+  }
+  return controls;
+}
+
 std::vector<std::pair<core::TimeNs, belief::Action>> WaitingControls::all() const {
   std::vector<std::pair<core::TimeNs, belief::Action>> all;
   for (const Waiting& waiting : waiting_) all.emplace_back(waiting.due_ns, waiting.action);

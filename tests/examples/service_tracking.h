@@ -6,6 +6,7 @@
 
 #include "prescene/belief/scene.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/tracking/tracker.h"
 #include "prescene/service/tracking/tracker_settings.h"
 
 namespace prescene::service::given_service_tracking {
@@ -33,5 +34,11 @@ extern const interfaces::ReceivedMessage message;
 extern const MessageIndex index;
 extern const core::TimeNs now_ns;
 }  // namespace tracker_h
+
+namespace tracker_snapshot_h {
+extern const std::shared_ptr<const belief::Scene> scene;
+extern const Tracker tracker;
+extern Tracker other;
+}  // namespace tracker_snapshot_h
 
 }  // namespace prescene::service::given_service_tracking

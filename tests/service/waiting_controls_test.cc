@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/tracking/tracker.h"
@@ -45,6 +47,40 @@ TEST(WaitingControls, GiveWhatIsDueInItsOrderAndKeepTheRest) {
   const belief::Control later = controls.due(kNoon + kSecond / 5, kNoon + kSecond);
   EXPECT_THAT(kinds(later), ElementsAre("release"));
   EXPECT_NEAR(later.actions[0].time, 0.3, 1e-9);
+}
+
+TEST(WaitingControls, AreReadBackFromTheirJson) {
+  WaitingControls controls;
+  ASSERT_TRUE(controls.take_in(message(stamped(kNoon + kSecond / 3), kNoon), kNoon).ok());
+  ASSERT_TRUE(controls.take_in(message(kGrasp, kNoon + 7), kNoon).ok());
+  ASSERT_TRUE(controls
+                  .take_in(message(R"({"actions": [{"time": 0.1, "place": {"object": "box",
+                      "pose": {"position": [0, 0, 0.1]}, "duration": 0.7}}]})",
+                                   kNoon),
+                           kNoon)
+                  .ok());
+  const auto json = nlohmann::ordered_json::parse(controls.to_json().dump());
+  auto read = WaitingControls::from_json(json);
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_EQ(read->to_json(), controls.to_json());
+  // They go on alike, also where a release takes the place of how the placement ends, and where a restart comes.
+  for (WaitingControls* both : {&controls, &*read}) {
+    EXPECT_THAT(kinds(both->due(kNoon, kNoon + kSecond)), ElementsAre("grasp", "release", "release"));
+    ASSERT_TRUE(both->take_in(message(kRelease, kNoon), kNoon).ok());
+    EXPECT_THAT(kinds(both->due(kNoon, kNoon + kSecond)), ElementsAre("grasp", "release", "release"));
+    ASSERT_TRUE(both->take_in(message(R"({"restart": true})", kNoon), kNoon).ok());
+  }
+  EXPECT_TRUE(WaitingControls::from_json(controls.to_json())->take_restart());
+  for (const char* key : {"waiting", "dropped", "restarts"}) {
+    nlohmann::ordered_json without = json;
+    without.erase(key);
+    EXPECT_THAT(WaitingControls::from_json(without).status().message(), HasSubstr(key));
+  }
+  for (const char* key : {"due_ns", "after_ns", "sent_ns", "action", "ends_place"}) {
+    nlohmann::ordered_json without = json;
+    without["waiting"][0].erase(key);
+    EXPECT_THAT(WaitingControls::from_json(without).status().message(), HasSubstr(key));
+  }
 }
 
 TEST(WaitingControls, APlaceReleasesItsObjectAtItsEndAndOnce) {

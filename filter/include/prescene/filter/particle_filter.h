@@ -12,9 +12,10 @@
 // weighed with its camera's pose, intrinsics, depth noise and learned colours. Frames of different cameras may have one
 // stamp.
 //
-// A belief is all that is carried from frame to frame: a filter may be thrown away and made anew between two steps, and
-// any step may be repeated. The same belief, observation, control and settings give the same bits, for any number of
-// threads, if likelihood and renderer promise theirs.
+// A belief is all that is carried from frame to frame, but for how sharp each camera was when that was last measured: a
+// filter may be thrown away and made anew between two steps, which then goes on as one that measures cameras anew. The
+// same belief, observation, control and settings give the same bits, for any number of threads, if likelihood and
+// renderer promise theirs.
 #pragma once
 
 #include <cstdint>
@@ -141,6 +142,9 @@ class ParticleFilter {
   /// Whether StepResult::supports holds all that the frame shows, or only those that follow the frames.
   void report_supports(bool reports) { reports_supports_ = reports; }
   MeshCache& meshes() { return meshes_; }
+  /// Forgets what is measured of the cameras only now and then (how sharp they are), as a filter that is made anew: the
+  /// next steps then depend on the belief alone.
+  void measure_cameras_anew() { smears_.clear(); }
 
   /// The belief before any frame: the scene's priors, step 0.
   belief::Belief start(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) const;

@@ -79,6 +79,11 @@ class CameraFrames {
   /// The frame that a recording names, by its camera and depth image, at the time at which it was taken; empty if it
   /// is not there. Of a single camera that is what take() does.
   std::optional<AssembledFrame> take_recorded(int camera, MessageIndex depth, core::TimeNs now_ns);
+  /// Goes on as after that frame was taken, which is not given again: nothing older is. Where it is not there, nothing
+  /// is changed.
+  void resume_after(int camera, MessageIndex depth, core::TimeNs now_ns);
+  /// As of FrameAssembler, the lowest of all cameras.
+  std::optional<MessageIndex> oldest_needed() const;
   /// As of FrameAssembler, of all cameras; reasons name the camera where there are several.
   std::optional<core::TimeNs> next_deadline() const;
   std::vector<SkippedFrame> take_skipped();

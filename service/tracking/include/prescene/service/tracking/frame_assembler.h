@@ -114,6 +114,9 @@ class FrameAssembler {
   std::optional<DepthTimes> waiting(MessageIndex depth) const;
   /// Its frame, as a recording says; empty if it does not wait or is not complete.
   std::optional<AssembledFrame> take_recorded(MessageIndex depth, core::TimeNs now_ns);
+  /// The lowest number of a message that a later frame may be made of, images only: the depth image that was taken
+  /// last, what waits, and the colour images that may belong to either. Empty where there is none.
+  std::optional<MessageIndex> oldest_needed() const;
   /// Skips what waits with a stamp up to this one.
   void skip_up_to(core::TimeNs stamp_ns, const std::string& reason);
   /// Whether a depth image waits whose stamp is in [from_ns, before_ns).
@@ -188,6 +191,7 @@ class FrameAssembler {
   MessageIndex camera_index_ = 0;
   std::vector<std::string> camera_doubts_;
   struct Taken {
+    MessageIndex index;
     core::TimeNs stamp_ns;
     core::TimeNs received_ns;
     geometry::PinholeCamera camera;

@@ -21,6 +21,7 @@
 #include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/step_record.h"
 #include "prescene/service/tracking/tracker_settings.h"
+#include "prescene/service/tracking/tracker_snapshot.h"
 #include "prescene/service/tracking/waiting_controls.h"
 
 namespace prescene::service {
@@ -68,6 +69,17 @@ class Tracker {
   /// What the newest message on it said; 0 = none has come.
   core::TimeNs simulated_now_ns() const { return simulated_now_ns_; }
 
+  /// All that later steps depend on, but for what ParticleFilter measures of cameras now and then, and messages: those
+  /// of tf, joint states, camera infos and settings, and the images from oldest_needed() on.
+  TrackerSnapshot snapshot() const { return {belief(), controls_, taken_}; }
+  std::optional<MessageIndex> oldest_needed() const { return frames_.oldest_needed(); }
+  /// Goes on from there; to be called when these messages were taken in.
+  void resume(const TrackerSnapshot& snapshot);
+  /// As ParticleFilter's; to be called where a snapshot is made, so that whoever resumes comes to the same bits.
+  void measure_cameras_anew() { filter_.measure_cameras_anew(); }
+  /// The scene that snapshots are of: as it was given, with what the learned file says of models.
+  const std::shared_ptr<const belief::Scene>& scene() const { return scene_; }
+
   /// As ParticleFilter::trace_stages().
   void trace_stages(bool traces) { filter_.trace_stages(traces); }
   /// As ParticleFilter::report_supports().
@@ -110,6 +122,7 @@ class Tracker {
   core::TimeNs simulated_now_ns_ = 0;
   MessageIndex last_index_ = 0;
   WaitingControls controls_;
+  std::vector<TrackerSnapshot::Taken> taken_;   // the newest of each camera
   std::shared_ptr<const belief::Scene> scene_;  // as given, with the values of learned models
   interfaces::LearnedFile learned_;
   std::vector<belief::PhysicalBelief> physics_;  // at the start, of the scene's objects

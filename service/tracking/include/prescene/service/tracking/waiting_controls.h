@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -74,6 +75,10 @@ class WaitingControls {
   void forget_due(core::TimeNs end_ns);
   /// All that waits, with when it is due, in its order.
   std::vector<std::pair<core::TimeNs, belief::Action>> all() const;
+
+  /// All that is kept, and the same from it; kInvalidInput naming the key that makes no sense.
+  nlohmann::ordered_json to_json() const;
+  static core::Result<WaitingControls> from_json(const nlohmann::ordered_json& json);
 
   std::size_t count() const { return waiting_.size(); }
   /// Since the start.
