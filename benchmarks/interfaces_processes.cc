@@ -111,7 +111,7 @@ void run_service(const std::string& scene_yaml, int domain, SharedFigures<FrameT
 }
 
 void run_recorder(int domain, const std::filesystem::path& path, const core::Cancellation& cancellation) {
-  const auto recording = service::RecordingWriter::create(path, {});
+  const auto recording = service::RollingRecording::create(path, {}, {.part = {}, .safety = {}});
   PRESCENE_CHECK_MSG(recording.ok(), recording.status().message());
   const auto done = service::record_topics(on_domain(domain, "bench_recorder"), {service::CameraInput()}, cancellation,
                                            log_sink("recorder"), **recording);

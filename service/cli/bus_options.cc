@@ -112,15 +112,40 @@ core::Status check_topics_once(const CLI::App& verb, const belief::Scene& scene)
   return core::ok_status();
 }
 
-void add_input_options(CLI::App& verb, double& depth_scale, double& frame_rate, bool& salvage) {
+void add_input_options(CLI::App& verb, double& depth_scale, double& frame_rate, RecordingReadOptions& read) {
   verb.add_option("--depth-scale", depth_scale, "Of a folder: metres per unit of the depth images")
       ->check(positive_number())
       ->capture_default_str();
   verb.add_option("--frame-rate", frame_rate, "Of a folder: frames a second")
       ->check(positive_number())
       ->capture_default_str();
-  verb.add_flag("--salvage", salvage,
+  verb.add_flag("--all-parts", read.all_parts,
+                "Of a recording that goes on in several files, also those after RECORDING (run_0001.mcap, ...)");
+  verb.add_flag("--salvage", read.salvage,
                 "Read what is sound of a damaged recording, and say what was left out, instead of refusing it");
+}
+
+void tell_what_goes_on(const ReplayInput& input, VerbContext& context) {
+  if (input.goes_on_in().empty()) return;
+  core::log(context.log(), core::LogLevel::kInfo,
+            "the recording goes on in " + input.goes_on_in().string() + ", which is not read: --all-parts reads all");
+}
+
+void add_part_options(CLI::App& verb, PartLimits& limits) {
+  const auto bytes = [](double megabytes) { return static_cast<std::uint64_t>(1e6 * megabytes); };
+  verb.add_option("--part-seconds", limits.seconds,
+                  "The recording goes on in a new file (run_0001.mcap, ...) after so many seconds; 0 = only before its "
+                  "index gets too long to be read")
+      ->check(number_between(0.0, 1e9))
+      ->capture_default_str();
+  verb.add_option_function<double>(
+          "--part-megabytes", [&limits, bytes](const double& megabytes) { limits.bytes = bytes(megabytes); },
+          "The same when a file has so many megabytes")
+      ->check(number_between(1.0, 1e9));
+  verb.add_option_function<double>(
+          "--keep-megabytes", [&limits, bytes](const double& megabytes) { limits.keep_bytes = bytes(megabytes); },
+          "Remove the oldest files of this recording while all of them have more; the newest two stay")
+      ->check(number_between(1.0, 1e9));
 }
 
 core::Status check_folder_options(const CLI::App& verb, const std::string& input) {

@@ -153,6 +153,7 @@ core::Status run(ExplainVerbOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.input, options.scene, options.depth_scale,
                                                            options.frame_rate, options.explain.read},
                                                           context.log()));
+  tell_what_goes_on(input, context);
   PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *input.scene()));
   TrackerSettings settings = options.tracker;
   if (input.has_settings()) {
@@ -232,7 +233,7 @@ Verb add_explain_verb(CLI::App& app) {
                    "Of the probabilities' intervals: good enough to stop searching")
       ->check(number_between(0.001, 0.5))
       ->capture_default_str();
-  add_input_options(*verb, options->depth_scale, options->frame_rate, options->explain.read.salvage);
+  add_input_options(*verb, options->depth_scale, options->frame_rate, options->explain.read);
   add_topic_options(*verb, options->tracker);
   add_camera_options(*verb, options->tracker.assembler);
   add_likelihood_options(*verb, options->backends.likelihood);

@@ -21,6 +21,7 @@ struct RecordOptions {
   std::vector<std::string> removals;
   std::vector<std::string> puts;
   bool unreported_robot = false;
+  PartLimits parts;
   SimulatedRecordingOptions simulation;
   interfaces::DdsOptions dds;
   TrackerSettings tracker;
@@ -100,7 +101,8 @@ core::Status record_bus(RecordOptions& options, VerbContext& context) {
     info.scene_file = options.scene;
     info.files = std::move(files);
   }
-  PRESCENE_TRY(const auto recording, RecordingWriter::create(output, info, kLiveRecording));
+  PRESCENE_TRY(const auto recording,
+               RollingRecording::create(output, std::move(info), {.part = options.parts}, context.log()));
   PRESCENE_TRY(const std::uint64_t messages,
                record_topics(options.dds, cameras, context.cancellation(), context.log(), *recording));
   context.print({{"recording", output}, {"messages", messages}, {"simulated", false}},
@@ -136,6 +138,9 @@ Verb add_record_verb(CLI::App& app) {
   verb->add_flag("--unreported-robot", options->unreported_robot,
                  "The robot moves and acts, but neither its poses nor its actions are published")
       ->needs("--simulate");
+  add_part_options(*verb, options->parts);
+  for (const char* name : {"--part-seconds", "--part-megabytes", "--keep-megabytes"})
+    verb->get_option(name)->excludes(verb->get_option("--simulate"));
   add_bus_options(*verb, options->dds, options->tracker);
   options->verb = verb;
   verb->footer(

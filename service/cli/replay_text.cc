@@ -151,6 +151,7 @@ std::string warnings_text(const ReplaySummary& summary) {
     text += counted(summary.refused, "message") + " refused; the first: " + summary.first_refusal + "\n";
   }
   if (summary.skipped > 0 && !summary.last_skip.empty()) text += "the last frame skipped: " + summary.last_skip + "\n";
+  if (!summary.began_anew.empty()) text += summary.began_anew + "\n";
   if (!summary.loss.empty()) text += summary.loss + "\n";
   return text.empty() ? "" : "\nWarnings\n" + text;
 }

@@ -116,6 +116,7 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
     options.bus.questions.push_back(std::move(question));
   }
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
+  tell_what_goes_on(input, context);
   PRESCENE_TRY(const TrackerSettings settings, settings_of(options, input));
   std::stable_sort(options.bus.questions.begin(), options.bus.questions.end(),
                    [](const TimedQuestion& a, const TimedQuestion& b) { return a.at < b.at; });
@@ -244,6 +245,7 @@ class ReplayTimeline {
 
 core::Status run_here(ReplayOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open(input_of(options), context.log()));
+  tell_what_goes_on(input, context);
   PRESCENE_TRY(TrackerSettings settings, settings_of(options, input));
   settings.assembler.robot = input.robot();
   if (!options.proposals.empty()) {
@@ -337,6 +339,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
        {"different_steps", summary->different},
        {"compared_explanations", explained.compared()},
        {"different_explanations", explained.different()},
+       {"began_anew", summary->began_anew},
        {"loss", summary->loss},
        {"damaged_records", damaged.count()},
        {"unchecked", summary->unchecked},
@@ -392,7 +395,7 @@ core::Status check_options(const ReplayOptions& options) {
     return core::invalid_input("--from " + core::rounded_text(options.read.from) + " is not before --to " +
                                core::rounded_text(options.read.to) + ": exchange them");
   if (!interfaces::is_bag(options.input)) {
-    for (const char* name : {"--from", "--to"})
+    for (const char* name : {"--from", "--to", "--all-parts"})
       if (given(name)) return core::invalid_input(std::string(name) + " is for recordings: leave it out");
     return core::ok_status();
   }
@@ -421,7 +424,7 @@ Verb add_replay_verb(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--ask", options->questions, "Over DDS: SECONDS:JSON, a question to ask at that time; repeatable")
       ->needs("--over-dds");
-  add_input_options(*verb, options->depth_scale, options->frame_rate, options->read.salvage);
+  add_input_options(*verb, options->depth_scale, options->frame_rate, options->read);
   verb->add_option("--from", options->read.from,
                    "Begin so many seconds after the recording's first message: the belief begins anew there")
       ->check(number_between(0.0, 1e9))

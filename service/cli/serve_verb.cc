@@ -17,6 +17,7 @@ namespace {
 struct ServeOptions {
   std::string scene;
   std::string record;
+  PartLimits parts;
   std::string proposals;
   std::string learned;
   LiveSettings settings;
@@ -62,14 +63,14 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(check_apart("--learned", options.learned, "--record", options.record));
   PRESCENE_RETURN_IF_ERROR(take_learned(options.learned, {options.scene}, options.settings.tracker));
   options.settings.learned_file = options.learned;
-  std::unique_ptr<RecordingWriter> recording;
+  std::unique_ptr<RollingRecording> recording;
   if (!options.record.empty()) {
     options.record = live_recording_path(options.record, context);
     PRESCENE_TRY(recording,
-                 RecordingWriter::create(options.record,
-                                         {options.scene, text, context.options().seed,
-                                          belief::json_text(to_json(options.settings.tracker)), std::move(files)},
-                                         kLiveRecording));
+                 RollingRecording::create(options.record,
+                                          {options.scene, text, context.options().seed,
+                                           belief::json_text(to_json(options.settings.tracker)), std::move(files)},
+                                          {.part = options.parts}, context.log()));
   }
   const auto started_with = [&options](const char* name, ParameterValue value, const char* description) {
     options.settings.started_with.push_back({name, description, std::move(value)});
@@ -106,6 +107,9 @@ Verb add_serve_verb(CLI::App& app) {
       ->required();
   verb->add_option("--record", options->record, "Record everything that comes in and what was done with it (MCAP)")
       ->check(file_name());
+  add_part_options(*verb, options->parts);
+  for (const char* name : {"--part-seconds", "--part-megabytes", "--keep-megabytes"})
+    verb->get_option(name)->needs(verb->get_option("--record"));
   add_belief_options(*verb, options->settings.tracker, options->learned);
   verb->add_option("--question-seconds", options->settings.worker.default_seconds,
                    "Time that a question without limits of its own may take, s")

@@ -19,6 +19,8 @@
 #include "prescene/geometry/pose.h"
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/rendering/gpu/likelihood_choice.h"
+#include "prescene/service/recording/replay_input.h"
+#include "prescene/service/recording/rolling_recording.h"
 #include "prescene/service/tracking/tracker_settings.h"
 #include "prescene/service/view/view_server.h"
 
@@ -115,8 +117,12 @@ void add_topic_options(CLI::App& verb, TrackerSettings& tracker);
 core::Status check_topics_once(const CLI::App& verb, const belief::Scene& scene);
 /// Both.
 void add_bus_options(CLI::App& verb, interfaces::DdsOptions& dds, TrackerSettings& tracker);
-/// Of a recording that is read: --depth-scale and --frame-rate of a folder of images, --salvage.
-void add_input_options(CLI::App& verb, double& depth_scale, double& frame_rate, bool& salvage);
+/// Of a recording that is read: --depth-scale and --frame-rate of a folder of images, --salvage, --all-parts.
+void add_input_options(CLI::App& verb, double& depth_scale, double& frame_rate, RecordingReadOptions& read);
+/// Says that the recording goes on in another file, which is not read.
+void tell_what_goes_on(const ReplayInput& input, VerbContext& context);
+/// Of a recording that is made live: when a new file begins, and how much is kept.
+void add_part_options(CLI::App& verb, PartLimits& limits);
 /// kInvalidInput for --depth-scale and --frame-rate where the input is no folder of images.
 core::Status check_folder_options(const CLI::App& verb, const std::string& input);
 /// --world-frame and --camera-pose.

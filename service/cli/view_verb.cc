@@ -42,6 +42,7 @@ std::vector<std::string> remarks_of(const ReplaySummary& summary) {
   if (summary.different > 0)
     remarks.push_back(counted(summary.different, "step") + " of " + std::to_string(summary.compared) +
                       " differ from the recorded ones");
+  if (!summary.began_anew.empty()) remarks.push_back(summary.began_anew);
   for (const auto& [what, steps] : summary.degraded) remarks.push_back(counted(steps, "step") + ": " + what);
   return remarks;
 }
@@ -55,6 +56,7 @@ core::Status view_recording(ViewVerbOptions& options, VerbContext& context) {
   PRESCENE_TRY(const ReplayInput input, ReplayInput::open({options.recording, options.scene, options.depth_scale,
                                                            options.frame_rate, options.read},
                                                           context.log()));
+  tell_what_goes_on(input, context);
   PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *input.scene()));
   TrackerSettings settings = options.tracker;
   if (input.has_settings()) {
@@ -107,7 +109,8 @@ core::Status view_bus(ViewVerbOptions& options, VerbContext& context) {
 core::Status check_options(const ViewVerbOptions& options) {
   const auto given = [&options](const char* name) { return options.verb->count(name) > 0; };
   if (options.recording.empty()) {
-    for (const char* name : {"--depth-scale", "--frame-rate", "--salvage", "--likelihood", "--graphics-device"})
+    for (const char* name :
+         {"--depth-scale", "--frame-rate", "--salvage", "--all-parts", "--likelihood", "--graphics-device"})
       if (given(name)) return core::invalid_input(std::string(name) + " is for recordings: leave it out, or name one");
     return core::ok_status();
   }
@@ -137,7 +140,7 @@ Verb add_view_verb(CLI::App& app) {
           "Scene file; default: the one that the recording holds; a folder without one is searched for its support; of "
           "what is on the bus, only what its markers show is drawn")
       ->check(file_name());
-  add_input_options(*verb, options->depth_scale, options->frame_rate, options->read.salvage);
+  add_input_options(*verb, options->depth_scale, options->frame_rate, options->read);
   add_web_options(*verb, "", options->view);
   add_bus_options(*verb, options->dds, options->tracker);
   add_camera_options(*verb, options->tracker.assembler);

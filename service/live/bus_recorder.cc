@@ -20,7 +20,7 @@ constexpr InboxLimit kWaitingTransforms{.messages = 10'000, .bytes = std::size_t
 
 core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, const std::vector<CameraInput>& cameras,
                                           const core::Cancellation& cancellation, const core::LogSink& log,
-                                          RecordingWriter& recording) {
+                                          RollingRecording& recording) {
   std::map<std::string, InboxLimit> limits;
   for (const CameraInput& camera : cameras)
     limits.insert({{camera.topics.depth, kWaitingImages},
@@ -54,10 +54,11 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
       // Never back, so that the order by time is the order of arrival.
       message.received_ns = last_ns = std::max(last_ns, message.received_ns);
       std::erase_if(waits_for, [&](const CameraInput& camera) { return camera.topics.depth == message.topic; });
-      PRESCENE_RETURN_IF_ERROR(recording.write(message).status());
+      recording.write(message);
       ++messages;
     }
-    PRESCENE_RETURN_IF_ERROR(recording.write_due(core::steady_now_ns()));
+    recording.write_due(core::steady_now_ns());
+    if (recording.is_change_due()) recording.change(nullptr);
     const bool is_late = recording.seconds_at_risk() > kTooLongAtRisk;
     if (is_late && !was_late)
       core::log(log, core::LogLevel::kWarning,

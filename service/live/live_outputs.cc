@@ -19,18 +19,14 @@ using interfaces::DdsPublisher;
 using interfaces::TopicQos;
 
 void LiveService::Impl::record(const std::string& topic, const std::string& json) {
-  if (!recording) return;
-  const core::Status written = recording->write_json(topic, json, last_now_ns);
-  if (!written.ok()) give_up_recording(written);
+  if (recording) recording->write_json(topic, json, last_now_ns);
 }
 
 template <class Message>
 void LiveService::Impl::record_output(const std::string& topic, const std::string& type, const Message& message,
                                       core::TimeNs stamp_ns) {
-  if (!recording) return;
-  const core::Status written =
-      recording->write_output(topic, type, interfaces::encode_cdr(message), stamp_ns, last_now_ns);
-  if (!written.ok()) give_up_recording(written);
+  if (!recording || !recording->is_on()) return;
+  recording->write_output(topic, type, interfaces::encode_cdr(message), stamp_ns, last_now_ns);
 }
 
 template <class Message>
@@ -44,14 +40,19 @@ void LiveService::Impl::record_step(const StepRecord& step) {
   try {
     record(kStepTopic, belief::json_text(to_json(step)));
   } catch (const std::exception& error) {
-    give_up_recording(core::unavailable(std::string("a step could not be recorded: ") + error.what()));
+    if (recording) recording->fail(core::unavailable(std::string("a step could not be recorded: ") + error.what()));
   }
 }
 
-void LiveService::Impl::give_up_recording(const core::Status& why) {
-  recording_status = why;
-  core::log(log, core::LogLevel::kError, why.message() + "; going on without recording");
-  recording.reset();
+void LiveService::Impl::look_after_recording(core::TimeNs now_ns) {
+  if (!recording) return;
+  recording->write_due(now_ns);
+  if (const auto oldest = tracker->oldest_needed()) recording->need_images_from(*oldest);
+  if (!recording->is_change_due()) return;
+  tracker->measure_cameras_anew();
+  recording->change([snapshot = tracker->snapshot(), scene_of_it = tracker->scene()] {
+    return snapshot_text(snapshot, scene_of_it);
+  });
 }
 
 void LiveService::Impl::check_sent(const core::Status& status) {
@@ -129,8 +130,11 @@ ServiceHealth LiveService::Impl::health() const {
   health.last_idle_control = last_idle_control;
   health.other_services = node->other_writers(kBeliefTopic);
   health.is_recording = recording != nullptr;
-  if (recording) health.recording_at_risk_s = recording->seconds_at_risk();
-  if (!recording_status.ok()) health.recording_failure = recording_status.message();
+  if (recording) {
+    health.recording_at_risk_s = recording->seconds_at_risk();
+    health.recording = recording->state();
+    health.recording_failure = health.recording.failure;
+  }
   health.keeps_learned = !settings.learned_file.empty();
   health.learned_failure = learned_failure;
   health.questions = worker->counts();

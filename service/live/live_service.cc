@@ -57,7 +57,7 @@ FrameHistorySettings frame_settings(const LiveSettings& settings) {
 }  // namespace
 
 LiveService::Impl::Impl(std::shared_ptr<const belief::Scene> a_scene, const LiveSettings& a_settings,
-                        std::unique_ptr<Tracker> a_tracker, std::unique_ptr<RecordingWriter> a_recording,
+                        std::unique_ptr<Tracker> a_tracker, std::unique_ptr<RollingRecording> a_recording,
                         core::LogSink a_log)
     : scene(std::move(a_scene)),
       settings(of_first_camera(a_settings, *scene)),
@@ -82,7 +82,7 @@ LiveService::~LiveService() = default;
 core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<const belief::Scene> scene,
                                                                const LiveSettings& settings, std::uint64_t seed,
                                                                Backends& backends,
-                                                               std::unique_ptr<RecordingWriter> recording,
+                                                               std::unique_ptr<RollingRecording> recording,
                                                                const core::LogSink& log) {
   PRESCENE_TRY(auto tracker, Tracker::create(scene, settings.tracker, seed, backends));
   auto impl = std::make_unique<Impl>(std::move(scene), settings, std::move(tracker), std::move(recording), log);
@@ -259,15 +259,7 @@ void LiveService::Impl::put_text(const char* topic, const std::string& text) {
 void LiveService::Impl::take_in(ReceivedMessage& message) {
   message.received_ns = std::max(message.received_ns, last_now_ns);
   last_now_ns = message.received_ns;
-  MessageIndex index = next_index++;
-  if (recording) {
-    const auto written = recording->write(message);
-    if (written) {
-      index = *written;
-    } else {
-      give_up_recording(written.status());
-    }
-  }
+  const MessageIndex index = recording ? recording->write(message) : next_index++;
   depth_has_come = depth_has_come || std::any_of(cameras.begin(), cameras.end(), [&](const CameraInput& camera) {
                      return message.topic == camera.topics.depth;
                    });
@@ -303,10 +295,7 @@ bool LiveService::Impl::look_after_frames() {
   }
   const core::TimeNs now_ns = now();
   for (const std::string& answer : answers_given) record(kAnswerTopic, answer);
-  if (recording) {
-    const core::Status written = recording->write_due(now_ns);
-    if (!written.ok()) give_up_recording(written);
-  }
+  look_after_recording(now_ns);
   bool stepped = false;
   try {
     if (const auto step = tracker->step(now_ns)) {
@@ -363,7 +352,7 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
     }
   }
   core::log(impl.log, core::LogLevel::kInfo, "stopped after " + std::to_string(impl.steps) + " steps");
-  const core::Status recorded = impl.recording ? impl.recording->close() : impl.recording_status;
+  const core::Status recorded = impl.recording ? impl.recording->close() : core::ok_status();
   if (impl.learned_file) impl.keep_learned();
   const core::Status kept = impl.learned_file ? impl.learned_file->wait() : core::ok_status();
   return recorded.ok() ? kept : recorded;

@@ -51,7 +51,7 @@ struct LiveService::Impl {
   static constexpr const char* kPoseType = "geometry_msgs/msg/PoseWithCovarianceStamped";
 
   Impl(std::shared_ptr<const belief::Scene> a_scene, const LiveSettings& a_settings, std::unique_ptr<Tracker> a_tracker,
-       std::unique_ptr<RecordingWriter> a_recording, core::LogSink a_log);
+       std::unique_ptr<RollingRecording> a_recording, core::LogSink a_log);
 
   core::Status join_bus();
   /// Passes on the lines that matter enough.
@@ -76,10 +76,10 @@ struct LiveService::Impl {
   template <class Message>
   void publish(const interfaces::DdsPublisher& publisher, const std::string& topic, const std::string& type,
                const Message& message, core::TimeNs stamp_ns);
-  /// Without one of its steps a recording can't be replayed: it ends where that can't be written.
+  /// Without one of its steps a recording can't be replayed: it pauses where that can't be written.
   void record_step(const StepRecord& step);
-  /// The recording ends here, and is an error of the run.
-  void give_up_recording(const core::Status& why);
+  /// Writes what was kept back, and begins a new file when it is time.
+  void look_after_recording(core::TimeNs now_ns);
   /// Has what was learned written if it was not yet, or could not be.
   void keep_learned();
   /// The same from time to time; a failure is logged and published, and tried again.
@@ -109,8 +109,7 @@ struct LiveService::Impl {
   LiveSettings settings;
   std::vector<CameraInput> cameras;
   std::unique_ptr<Tracker> tracker;
-  std::unique_ptr<RecordingWriter> recording;
-  core::Status recording_status;
+  std::unique_ptr<RollingRecording> recording;  // null where none was asked for
   std::atomic<core::LogLevel> log_level{core::LogLevel::kInfo};
   LogLimiter log_limiter;
   core::LogSink log;

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "prescene/core/text.h"
-#include "prescene/service/recording/recording.h"
 
 namespace prescene::service {
 namespace {
@@ -16,7 +15,8 @@ using interfaces::RosDiagnosticLevel;
 std::uint64_t losses_of(const ServiceHealth& health) {
   std::uint64_t sum = health.lost_on_bus + health.unsent + health.failures + health.tf_forgotten + health.tf_late +
                       health.dropped_controls + health.idle_controls + health.unreadable_questions +
-                      health.questions.unanswered + health.questions.failed;
+                      health.questions.unanswered + health.questions.failed + health.recording.interruptions +
+                      health.recording.lost_messages;
   for (const auto& [topic, count] : health.dropped_in_inbox) {
     const auto& images = health.image_topics;
     if (std::find(images.begin(), images.end(), topic) == images.end()) sum += count;
@@ -57,10 +57,10 @@ std::string counts_text(const std::map<std::string, std::uint64_t>& counts) {
 std::string recording_text(const ServiceHealth& health) {
   if (!health.recording_failure.empty()) return "failed: " + health.recording_failure;
   if (!health.is_recording) return "off";
-  return is_recording_late(health)
-             ? "on, but the disk is slow: what came in the last " + core::fixed_text(health.recording_at_risk_s, 1) +
-                   " s is lost if the power fails"
-             : "on";
+  if (is_recording_late(health))
+    return "on, but the disk is slow: what came in the last " + core::fixed_text(health.recording_at_risk_s, 1) +
+           " s is lost if the power fails";
+  return health.recording.not_removed.empty() ? "on" : "on, but " + health.recording.not_removed;
 }
 
 std::string learned_text(const ServiceHealth& health) {
@@ -84,17 +84,21 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
   const auto& [depth_topic, cameras, nothing_came, steps, skipped_frames, refused_messages, dropped_in_inbox,
                image_topics, lost_on_bus, questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten,
                tf_late, waiting_controls, dropped_controls, idle_controls, last_idle_control, other_services,
-               is_recording, recording_at_risk_s, recording_failure, keeps_learned, learned_failure,
+               is_recording, recording, recording_at_risk_s, recording_failure, keeps_learned, learned_failure,
                seconds_since_frame, clock_topic, simulated_now_s, seconds_since_tick, last_step_seconds, not_simulated,
                physics_failure, steppers, lens, degraded, last_skip, last_refusal, last_failure, last_failure_ns] =
       health;
   const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
+  const auto& [file, files, removed_files, interruptions, tries, lost_messages, failure, first_failure, without_belief,
+               not_removed] = recording;
   static_cast<void>(image_topics);         // says what of dropped_in_inbox is a loss
   static_cast<void>(nothing_came);         // is in the text
   static_cast<void>(is_recording);         // told, like
   static_cast<void>(recording_at_risk_s);  // both of these,
-  static_cast<void>(recording_failure);    // by recording_text()
+  static_cast<void>(recording_failure);    // by recording_text(),
+  static_cast<void>(failure);              // as
+  static_cast<void>(not_removed);          // these
   static_cast<void>(keeps_learned);        // and by
   static_cast<void>(learned_failure);      // learned_text(),
   static_cast<void>(clock_topic);          // and
@@ -121,6 +125,14 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
           {"last control without effect", last_idle_control},
           {"other services in the domain", std::to_string(other_services)},
           {"recording", recording_text(health)},
+          {"recorded file", is_recording ? file.string() : ""},
+          {"recorded files", std::to_string(is_recording ? files : 0)},
+          {"recorded files removed", std::to_string(removed_files)},
+          {"recording without a belief", without_belief},
+          {"recording interrupted", std::to_string(interruptions)},
+          {"first interruption", first_failure},
+          {"tries to go on recording", std::to_string(tries)},
+          {"messages not recorded", std::to_string(lost_messages)},
           {"keeps what it learns", learned_text(health)},
           {"simulated time, s", clock_text(health)},
           {"since the last frame, s", seconds_since_frame ? core::fixed_text(*seconds_since_frame, 1) : ""},

@@ -26,7 +26,9 @@ FrameHistorySettings replayed_history(const TrackerSettings& settings) {
 
 /// Whether frames have to be kept: only a recording of ours holds explanations, and few do. A file that can't be read
 /// is left to the replay, which says so.
-bool may_hold_explanations(const std::filesystem::path& path) {
+bool may_hold_explanations(const std::filesystem::path& path, const ReplayInput& input) {
+  if (input.begins_later()) return false;
+  if (input.read_options().all_parts) return true;
   if (std::filesystem::is_directory(path) || path.extension() == ".db3") return false;
   interfaces::McapReaderOptions only_answers;
   only_answers.topics = {kAnswerTopic};
@@ -60,11 +62,12 @@ std::string text_to_compare(nlohmann::ordered_json answer) {
 ExplainedAgain::ExplainedAgain(const ReplayInput& input, std::filesystem::path path, const TrackerSettings& settings,
                                Backends& backends, const core::Cancellation& cancellation)
     : path_(std::move(path)),
+      reads_all_parts_(input.read_options().all_parts),
       settings_(settings),
       backends_(backends),
       cancellation_(cancellation),
       scene_text_(input.scene_text()),
-      keeps_frames_(may_hold_explanations(path_)),
+      keeps_frames_(may_hold_explanations(path_, input)),
       history_(replayed_history(settings)) {}
 
 void ExplainedAgain::add(const belief::Observation& observation, std::shared_ptr<const belief::Belief> belief) {
@@ -76,6 +79,7 @@ core::Status ExplainedAgain::read_controls(core::TimeNs until_ns) {
   if (!reader_) {
     RecordingReadOptions options;
     options.check_data = false;  // it was, when it was opened
+    options.all_parts = reads_all_parts_;
     PRESCENE_TRY(reader_, RecordingReader::open(path_, options));
   }
   while (controls_until_ns_ <= until_ns + kDisorderNs) {

@@ -32,6 +32,13 @@ constexpr double kOtherClock = 1.0;         // s
 class Overview {
  public:
   void add(const interfaces::McapChannel& channel, const interfaces::McapMessage& message) {
+    if (is_repeated(channel)) {  // What is known from it is; it does not count.
+      Topic& topic = topics_[{channel.topic, "robot", channel.schema.name}];
+      topic.row.name = channel.topic;
+      topic.row.type = channel.schema.name;
+      look_into(message, topic);
+      return;
+    }
     if (out_.messages++ == 0) out_.start_ns = message.log_time_ns;
     const double at = core::seconds_of(message.log_time_ns - out_.start_ns);
     out_.seconds = std::max(out_.seconds, at);
@@ -54,6 +61,7 @@ class Overview {
 
   RecordingOverview finish() {
     for (auto& [key, topic] : topics_) {
+      if (topic.row.messages == 0) continue;
       judge(topic);
       out_.topics.push_back(std::move(topic.row));
     }
@@ -223,17 +231,20 @@ core::Result<RecordingOverview> overview_of(const std::filesystem::path& path, c
   for (const interfaces::McapReader::AttachedFile& file : bag->attachments())
     out.attachments.push_back({file.name, file.bytes});
   const double total = static_cast<double>(bag->message_count().value_or(0));
+  std::uint64_t repeated = 0;  // messages that an earlier file holds, too
   for (;;) {
     if (cancellation.requested()) return core::cancelled("stopped on request");
     PRESCENE_TRY(const auto message, bag->next());
     if (!message) break;
-    overview.add(bag->channels()[static_cast<std::size_t>(message->channel)], *message);
+    const interfaces::McapChannel& channel = bag->channels()[static_cast<std::size_t>(message->channel)];
+    repeated += is_repeated(channel) ? 1 : 0;
+    overview.add(channel, *message);
     if (progress && total > 0.0) progress({std::min(1.0, static_cast<double>(out.messages) / total), {}, ""});
   }
   if (const std::string lost = bag->loss_text(); !lost.empty()) overview.problem(lost);
-  if (const auto count = bag->message_count(); count && *count != out.messages)
-    overview.problem("it says that it holds " + std::to_string(*count) + " messages; " + std::to_string(out.messages) +
-                     " could be read");
+  if (const auto count = bag->message_count(); count && *count != out.messages + repeated)
+    overview.problem("it says that it holds " + std::to_string(*count) + " messages; " +
+                     std::to_string(out.messages + repeated) + " could be read");
   {
     PRESCENE_TRY(const auto reader, RecordingReader::open(path, {.salvage = true, .check_data = false}));
     out.scene_file = reader->info().scene_file;

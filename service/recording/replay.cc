@@ -16,14 +16,12 @@ constexpr const char* kFolderCameraFrame = "camera";
 constexpr core::TimeNs kFolderLatencyNs = 1'000'000;
 constexpr std::size_t kMostDegraded = 100;  // different ones, as some name a number
 
-/// Whether Prescene wrote step records into this recording.
-core::Result<bool> has_step_records(const std::filesystem::path& path, const RecordingReadOptions& options) {
-  // Only a file of ours has them; and a belief that begins later goes its own way.
-  if (std::filesystem::is_directory(path) || path.extension() == ".db3" || options.from > 0.0) return false;
+/// Whether Prescene wrote step records into this file.
+core::Result<bool> has_step_records(const std::filesystem::path& path, bool salvage) {
   interfaces::McapReaderOptions only_steps;
   only_steps.topics = {kStepTopic};
-  only_steps.salvage = options.salvage;
-  only_steps.check_data = false;  // It was, just now.
+  only_steps.salvage = salvage;
+  only_steps.check_data = false;  // It is when the messages are read.
   PRESCENE_TRY(const auto reader, interfaces::McapReader::open(path, only_steps));
   for (;;) {
     PRESCENE_TRY(const auto message, reader->next());
@@ -31,6 +29,20 @@ core::Result<bool> has_step_records(const std::filesystem::path& path, const Rec
     // Another program may have recorded that topic when a recording was played.
     if (holds_own_json(reader->channels()[static_cast<std::size_t>(message->channel)])) return true;
   }
+}
+
+/// Whether there are step records that a replay follows.
+core::Result<bool> follows_step_records(const std::filesystem::path& path, const RecordingPart& part,
+                                        const RecordingReadOptions& options) {
+  // Only a file of ours has them; and a belief that begins later goes its own way.
+  if (std::filesystem::is_directory(path) || path.extension() == ".db3" || options.from > 0.0) return false;
+  PRESCENE_TRY(bool has_steps, has_step_records(path, options.salvage));
+  if (has_steps || !options.all_parts) return has_steps;
+  for (const std::filesystem::path& later : parts_after(path, part)) {
+    PRESCENE_TRY(has_steps, has_step_records(later, options.salvage));
+    if (has_steps) return true;
+  }
+  return false;
 }
 
 class Replay {
@@ -74,6 +86,25 @@ class Replay {
       if (!summary_.first_different_step) summary_.first_different_step = recorded.step;
     }
     return step ? deliver(*step) : core::ok_status();
+  }
+
+  /// A file of the recording after its first begins.
+  void begin(const PartStart& part) {
+    if (part.goes_on) {
+      tracker_.measure_cameras_anew();
+      return;
+    }
+    if (!summary_.followed_step_records) return;
+    const auto snapshot = part.snapshot.empty()
+                              ? core::Result<TrackerSnapshot>(core::not_found("it holds no belief to go on from"))
+                              : snapshot_from_text(part.snapshot, tracker_.scene());
+    if (snapshot) {
+      tracker_.resume(*snapshot);
+      return;
+    }
+    summary_.began_anew = "file " + std::to_string(part.number) + " of the recording: " + snapshot.status().message() +
+                          "; its steps are not compared: replay it together with those before it (--all-parts)";
+    summary_.followed_step_records = false;
   }
 
   ReplaySummary& summary() { return summary_; }
@@ -122,7 +153,7 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
                                              const core::ProgressSink& progress, const StepSink& on_step,
                                              const JsonSink& on_json) {
   PRESCENE_TRY(const auto reader, RecordingReader::open(path, options));
-  PRESCENE_TRY(const bool follow, has_step_records(path, options));
+  PRESCENE_TRY(const bool follow, follows_step_records(path, reader->info().part, options));
   const double total = static_cast<double>(reader->message_count().value_or(0));
   Replay replay(tracker, on_step, follow);
   ReadAhead ahead(*reader, [&tracker](const auto& message) { return tracker.decode(message); });
@@ -136,12 +167,13 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
     if (!entry) break;
     if (progress && total > 0.0) progress({static_cast<double>(++entries) / total, {}, ""});
     const RecordedEntry& recorded = entry->recorded;
+    if (recorded.part) replay.begin(*recorded.part);
     if (!recorded.is_json) {
       PRESCENE_RETURN_IF_ERROR(replay.take_in(recorded.message, recorded.index, std::move(entry->images)));
       continue;
     }
     const std::string json(recorded.message.cdr.begin(), recorded.message.cdr.end());
-    if (follow && recorded.message.topic == kStepTopic) {
+    if (replay.summary().followed_step_records && recorded.message.topic == kStepTopic) {
       PRESCENE_TRY(const StepRecord step, step_record_from_json(json));
       PRESCENE_RETURN_IF_ERROR(replay.follow(step));
     } else if (on_json) {

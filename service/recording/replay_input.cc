@@ -25,7 +25,9 @@ core::Result<ReplayInput> ReplayInput::open(const ReplayInputOptions& options, c
     input.info_ = reader->info();
     input.read_ = options.read;
     // Once is enough, and chunks are checked whenever they are read; what is salvaged has its loss reported at the end.
-    input.read_.check_data = options.read.salvage;
+    input.read_.check_data = options.read.salvage || options.read.all_parts;
+    if (!options.read.all_parts)
+      for (const std::filesystem::path& next : parts_after(options.path, input.info_.part, 1)) input.goes_on_in_ = next;
   }
   if (input.scene_) return input;
   if (!options.scene_file.empty()) {

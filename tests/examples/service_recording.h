@@ -60,6 +60,13 @@ extern const BeliefSummary summary;
 extern const belief::Observation observation;
 }  // namespace residuals_h
 
+namespace rolling_recording_h {
+extern const RecordingInfo info;
+extern const interfaces::ReceivedMessage message;
+extern const TrackerSnapshot snapshot;
+extern const std::shared_ptr<const belief::Scene> scene;
+}  // namespace rolling_recording_h
+
 namespace session_report_h {
 extern const std::shared_ptr<const belief::Scene> scene;
 extern const BeliefSummary summary;

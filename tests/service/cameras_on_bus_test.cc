@@ -67,7 +67,7 @@ class CamerasOnBus : public testing::Test {
   static std::unique_ptr<tests::RobotOnBus> camera(const std::string& name) {
     return std::make_unique<tests::RobotOnBus>(kScene, own_domain(), topics_of(name));
   }
-  void start(std::unique_ptr<RecordingWriter> recording = nullptr) {
+  void start(std::unique_ptr<RollingRecording> recording = nullptr) {
     LiveSettings settings;
     settings.dds.domain = own_domain();
     settings.diagnostics_rate = 50.0;
@@ -135,7 +135,7 @@ TEST_F(CamerasOnBus, AreBothUsedAndOneGoesAndComesBack) {
 TEST_F(CamerasOnBus, AreRecordedAndReplayedToTheSameBits) {
   const tests::ScratchDir folder;
   const std::filesystem::path path = folder.path() / "run.mcap";
-  auto recording = RecordingWriter::create(path, {"two.yaml", kScene, 1, ""});
+  auto recording = RollingRecording::create(path, {"two.yaml", kScene, 1, ""});
   ASSERT_TRUE(recording.ok());
   start(*std::move(recording));
   ASSERT_TRUE(sends_until([&] { return used("front") >= 15 && used("side") >= 15; })) << front_->diagnosis();

@@ -33,7 +33,7 @@ class LiveServiceTest : public ::testing::Test {
     }
   }
 
-  void start(std::unique_ptr<RecordingWriter> recording = nullptr, const std::string& clock = "",
+  void start(std::unique_ptr<RollingRecording> recording = nullptr, const std::string& clock = "",
              const std::string& scene_yaml = tests::kBoxScene) {
     const auto scene = load_scene_text(scene_yaml, "box.yaml", {});
     ASSERT_TRUE(scene.ok()) << scene.status().message();

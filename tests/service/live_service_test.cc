@@ -160,7 +160,7 @@ TEST_F(LiveServiceTest, SaysHowSimulatedTimeGoes) {
 
 TEST_F(LiveServiceTest, ARecordingThatFailsStandsInDiagnosticsAndInTheStatus) {
   const tests::ScratchDir folder;
-  auto recording = RecordingWriter::create(folder.path() / "run.mcap", {});
+  auto recording = RollingRecording::create(folder.path() / "run.mcap", {});
   ASSERT_TRUE(recording.ok()) << recording.status().message();
   const FullDisk full(20'000);
   start(*std::move(recording));
@@ -176,7 +176,7 @@ TEST_F(LiveServiceTest, ARecordingThatFailsStandsInDiagnosticsAndInTheStatus) {
 
 TEST_F(LiveServiceTest, RecordsAStepBeforeAnythingThatIsMadeOfIt) {
   const tests::ScratchDir folder;
-  auto recording = RecordingWriter::create(folder.path() / "run.mcap", {});
+  auto recording = RollingRecording::create(folder.path() / "run.mcap", {});
   ASSERT_TRUE(recording.ok()) << recording.status().message();
   start(*std::move(recording));
   ASSERT_TRUE(tracks_from(kNoon));

@@ -158,7 +158,7 @@ TEST_F(Table, TooManyNamesGetAnEmptyReply) {
 
 class ParametersOnBus : public LiveServiceTest {
  protected:
-  void begin(std::unique_ptr<RecordingWriter> recording = nullptr, const std::string& scene = tests::kBoxScene) {
+  void begin(std::unique_ptr<RollingRecording> recording = nullptr, const std::string& scene = tests::kBoxScene) {
     start(std::move(recording), "", scene);
     ASSERT_TRUE(client_.wait_for_services());
   }
@@ -280,7 +280,7 @@ TEST_F(ParametersOnBus, AReplaySetsThemWhereTheyWereSet) {
   empty_table.erase(empty_table.find("objects:"), empty_table.find("camera:") - empty_table.find("objects:"));
   const tests::ScratchDir folder;
   const auto path = folder.path() / "run.mcap";
-  auto recording = RecordingWriter::create(path, {"scene.yaml", empty_table, 1, ""});
+  auto recording = RollingRecording::create(path, {"scene.yaml", empty_table, 1, ""});
   ASSERT_TRUE(recording.ok()) << recording.status().message();
   begin(*std::move(recording), empty_table);
   EXPECT_EQ(value("new_objects"), ParamValue::of(true));

@@ -103,8 +103,17 @@ TEST(ServiceHealth, TellsOfEveryLossByItsPlace) {
   health.unlogged = 900;
   health.tf_forgotten = 6;
   health.tf_late = 8;
+  health.recording.interruptions = 2;
+  health.recording.tries = 31;
+  health.recording.lost_messages = 777;
+  health.recording.first_failure = "run.mcap: no space left";
   const auto status = to_diagnostic(health, {}, "here");
-  const std::vector<interfaces::RosKeyValue> some = {{"dropped in the inbox", "15"},
+  const std::vector<interfaces::RosKeyValue> some = {{"recording interrupted", "2"},
+                                                     {"first interruption", "run.mcap: no space left"},
+                                                     {"tries to go on recording", "31"},
+                                                     {"messages not recorded", "777"},
+                                                     {"recorded files", "0"},
+                                                     {"dropped in the inbox", "15"},
                                                      {"dropped by topic", "/camera/depth 3, /tf 12"},
                                                      {"not sent", "4"},
                                                      {"failures", "1"},
@@ -128,6 +137,8 @@ TEST(ServiceHealth, WarnsOfWhatWasLostSinceTheLastReportAndNotForEver) {
       [](ServiceHealth& health) { ++health.unsent; },
       [](ServiceHealth& health) { ++health.tf_forgotten; },
       [](ServiceHealth& health) { ++health.tf_late; },
+      [](ServiceHealth& health) { ++health.recording.interruptions; },
+      [](ServiceHealth& health) { ++health.recording.lost_messages; },
       [](ServiceHealth& health) { ++health.dropped_controls; },
       [](ServiceHealth& health) { ++health.idle_controls; },
       [](ServiceHealth& health) { ++health.dropped_in_inbox["/tf"]; }};

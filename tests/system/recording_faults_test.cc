@@ -92,6 +92,39 @@ TEST_F(RecordingFaults, KilledAtAnyMomentItOpensAgainAndReplays) {
               spread_text(seconds).c_str(), steps, empty);
 }
 
+TEST_F(RecordingFaults, KilledWhileItGoesOnInNewFilesEachOpensAgainAndReplays) {
+  const int moments = is_full_run() ? 20 : 2;
+  std::vector<double> seconds;
+  int steps = 0, files = 0;
+  for (int i = 0; i < moments; ++i) {
+    const std::string file = path("parts-" + std::to_string(i) + ".mcap");
+    const auto service = serve({"--record", file, "--part-seconds", "0.4"});
+    ASSERT_TRUE(tracks(*service)) << log();
+    first_ns_ = core::wall_now_ns();
+    drive_for(1.5 + 0.4 * i / moments);
+    const core::TimeNs killed_ns = core::wall_now_ns();
+    EXPECT_EQ(service->stop(SIGKILL), 128 + SIGKILL) << log();
+    ReadBack newest = read_back(file);
+    EXPECT_GT(newest.frames, 0u);
+    const auto reader = service::RecordingReader::open(file);
+    ASSERT_TRUE(reader.ok());
+    for (const std::filesystem::path& next : service::parts_after(file, (*reader)->info().part)) {
+      ++files;
+      const ReadBack read = read_back(next.string());
+      if (read.newest_frame_ns > newest.newest_frame_ns) newest = read;
+    }
+    seconds.push_back(lost(newest, killed_ns));
+    const int together = replay(file, {"--all-parts"});
+    EXPECT_GT(together, 0);
+    steps += together;
+  }
+  EXPECT_GE(files, moments);
+  std::printf(
+      "compared: killed while it goes on in new files: s lost: %s; %d files after the first of %d recordings; "
+      "%d steps replayed to the same bits\n",
+      spread_text(seconds).c_str(), files, moments, steps);
+}
+
 TEST_F(RecordingFaults, WhereThePowerFailsWhatTheDiskKeptOpensAgainAndReplays) {
   if (PRESCENE_SANITIZES_MEMORY) GTEST_SKIP() << "nothing can be preloaded before the sanitizer";
   const int moments = is_full_run() ? 25 : 2;

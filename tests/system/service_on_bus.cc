@@ -100,8 +100,10 @@ ReadBack ServiceOnBus::read_back(const std::string& file) {
   return read;
 }
 
-int ServiceOnBus::replay(const std::string& file) {
-  const Finished finished = run_program({"replay", file, "--json"});
+int ServiceOnBus::replay(const std::string& file, const std::vector<std::string>& options) {
+  std::vector<std::string> words = {"replay", file, "--json"};
+  words.insert(words.end(), options.begin(), options.end());
+  const Finished finished = run_program(words);
   EXPECT_EQ(finished.exit_code, 0) << file << ": " << finished.err;
   const auto json = nlohmann::ordered_json::parse(finished.out, nullptr, false);
   if (!json.is_object()) return 0;

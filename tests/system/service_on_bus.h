@@ -51,7 +51,7 @@ class ServiceOnBus : public ::testing::Test {
   /// Fails the test where the recording can't be opened.
   ReadBack read_back(const std::string& file);
   /// Replays it and compares each step with the recorded one; the number of steps.
-  int replay(const std::string& file);
+  int replay(const std::string& file, const std::vector<std::string>& options = {});
 
   const std::string scene_;
   ScratchDir folder_;

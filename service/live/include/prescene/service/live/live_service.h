@@ -21,7 +21,7 @@
 #include "prescene/service/live/node_parameters.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/recording/frame_history.h"
-#include "prescene/service/recording/recording.h"
+#include "prescene/service/recording/rolling_recording.h"
 #include "prescene/service/tracking/tracker.h"
 
 namespace prescene::service {
@@ -57,13 +57,13 @@ class LiveService {
   static core::Result<std::unique_ptr<LiveService>> create(std::shared_ptr<const belief::Scene> scene,
                                                            const LiveSettings& settings, std::uint64_t seed,
                                                            Backends& backends,
-                                                           std::unique_ptr<RecordingWriter> recording,
+                                                           std::unique_ptr<RollingRecording> recording,
                                                            const core::LogSink& log);
   ~LiveService();
 
   /// Works until cancelled, then closes the recording and writes the learned file. A recording that fails on the way (a
-  /// full disk) ends there, while tracking goes on; the status then says so, and also if the learned file could not be
-  /// written in the end.
+  /// full disk) pauses, while tracking goes on, until a new file can be begun; the status then says so, and also if the
+  /// learned file could not be written in the end.
   core::Status run(const core::Cancellation& cancellation);
   /// A question as if it had come over the bus, from any thread; its answer goes there, too. See QueryWorker::ask.
   void ask(std::string question_json);

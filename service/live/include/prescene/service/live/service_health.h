@@ -12,6 +12,7 @@
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/live/query_worker.h"
+#include "prescene/service/recording/rolling_recording.h"
 
 namespace prescene::service {
 
@@ -43,8 +44,9 @@ struct ServiceHealth {
   std::string last_idle_control;       ///< What the last of them was, and why.
   int other_services = 0;              ///< Which publish beliefs in the same DDS domain.
   bool is_recording = false;
+  RollingState recording;            ///< Where one was asked for.
   double recording_at_risk_s = 0.0;  ///< As RecordingWriter::seconds_at_risk().
-  std::string recording_failure;     ///< Why the recording ended early; "" = it did not, or none was asked for.
+  std::string recording_failure;     ///< Why nothing is recorded now; "" = it is, or none was asked for.
   bool keeps_learned = false;
   std::string learned_failure;  ///< Why what was learned could not be written the last time; "" = it could.
   /// Since the last frame that was used, by simulated time where there is one; empty = none yet.

@@ -21,7 +21,8 @@ namespace prescene::service {
 
 class ExplainedAgain {
  public:
-  /// All must outlive it.
+  /// All must outlive it. Of a recording that begins in a later file nothing is compared: what was asked counts from
+  /// its first.
   ExplainedAgain(const ReplayInput& input, std::filesystem::path path, const TrackerSettings& settings,
                  Backends& backends, const core::Cancellation& cancellation);
 
@@ -48,6 +49,7 @@ class ExplainedAgain {
                                       core::TimeNs recorded_ns);
 
   std::filesystem::path path_;
+  bool reads_all_parts_;
   const TrackerSettings& settings_;
   Backends& backends_;
   const core::Cancellation& cancellation_;

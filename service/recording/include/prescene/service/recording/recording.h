@@ -23,6 +23,15 @@
 
 namespace prescene::service {
 
+/// Which file it is of a recording that goes on in file after file (RollingRecording).
+struct RecordingPart {
+  std::string series;              ///< The same in all of them; "" = one file is all.
+  std::uint64_t number = 0;        ///< 0 = the first; ascends.
+  MessageIndex first_message = 0;  ///< The number of the first message of the robot that is new in it.
+  core::TimeNs began_ns = 0;       ///< When it was begun, by the clock of its log times.
+  bool after_gap = false;          ///< Something was not recorded between it and the one before.
+};
+
 /// What a recording says about itself, in its metadata record "prescene", with a checksum: in a recording that was cut
 /// there is no other.
 struct RecordingInfo {
@@ -33,16 +42,26 @@ struct RecordingInfo {
   /// To be attached, with the scene's text: all that the scene names; nothing: a replay looks for them on the disk.
   /// RecordingReader leaves it empty: its read_attached() gives single files.
   std::optional<FilesOfScene> files = std::nullopt;
+  RecordingPart part = {};
 };
 
-/// Where to record a robot: `path`, or where that is a file already, "run-2.mcap", "run-3.mcap", ... beside it. What a
-/// robot saw can't be seen again, so nothing live is written over it.
+/// Where to record a robot: `path`, or where that is a recording already (a file, or one of its parts), "run-2.mcap",
+/// "run-3.mcap", ... beside it. What a robot saw can't be seen again, so nothing live is written over it.
 std::filesystem::path unused_recording_path(const std::filesystem::path& path);
+
+/// The file of a recording's part: "run.mcap", "run_0001.mcap", ...
+std::filesystem::path part_path(const std::filesystem::path& first, std::uint64_t number);
+/// The files that go on after this one of a recording, in their order: those beside it whose names go on and that say
+/// that they belong to it, at most so many. Empty for a recording that is one file, and for what can't be read.
+std::vector<std::filesystem::path> parts_after(const std::filesystem::path& path, const RecordingPart& part,
+                                               std::size_t most = std::numeric_limits<std::size_t>::max());
 
 /// Whether a channel holds JSON of ours, in std_msgs/String: its metadata says so.
 bool holds_own_json(const interfaces::McapChannel& channel);
 /// Whether it holds what we made for other programs (RecordingWriter::write_output).
 bool is_own_output(const interfaces::McapChannel& channel);
+/// Whether it holds what an earlier file of the recording does (RecordingWriter::write_again).
+bool is_repeated(const interfaces::McapChannel& channel);
 
 /// What of a recording may be lost: of what came, the last `kept_back_s` where the program is killed, and that,
 /// `unsynced_s` and the time of two requests to the disk where the power fails.
@@ -61,17 +80,30 @@ class RecordingWriter {
   static core::Result<std::unique_ptr<RecordingWriter>> create(const std::filesystem::path& path,
                                                                const RecordingInfo& info,
                                                                const RecordingSafety& safety = {});
+  /// The same in two steps, of which the first takes the time of writing the attached files. Nothing else may be
+  /// written between them; `info.part` counts in the second only.
+  static core::Result<std::unique_ptr<RecordingWriter>> make_ready(const std::filesystem::path& path,
+                                                                   const RecordingInfo& info,
+                                                                   const RecordingSafety& safety);
+  core::Status begin(const RecordingInfo& info);
 
   /// Messages of the robot; numbered 0, 1, ... in the order of these calls. Their times are clamped to 1970 and
   /// kLatestRecordedNs: a sender's clock may say anything. What ends in an exception is not in the recording, and has
   /// no number.
   core::Result<MessageIndex> write(const interfaces::ReceivedMessage& message);
+  /// A message that an earlier file holds under that number, repeated for who replays this one alone: to be called
+  /// before any other is written, in ascending order. Readers that come from the file before pass over it.
+  core::Status write_again(const interfaces::ReceivedMessage& message, MessageIndex index);
+  /// The belief from which this file goes on (snapshot_text()).
+  core::Status write_snapshot(const std::string& text);
   /// One JSON document of ours on a /prescene/ topic, in a std_msgs/String. kResourceExhausted, writing nothing, above
   /// most_json_bytes().
   core::Status write_json(const std::string& topic, const std::string& json, core::TimeNs time_ns);
   /// What we make of the belief for other programs. A replay makes it anew, so RecordingReader passes over it.
   core::Status write_output(const std::string& topic, const std::string& type, std::span<const std::uint8_t> cdr,
                             core::TimeNs stamp_ns, core::TimeNs time_ns);
+  MessageIndex next_index() const { return next_index_; }
+  interfaces::McapWriter::Size size() const { return writer_->size(); }
   core::Status flush() { return writer_->flush(); }
   /// To be called now and then with the time, by which messages are received: writes what was kept back for long
   /// enough.
@@ -82,6 +114,9 @@ class RecordingWriter {
 
  private:
   explicit RecordingWriter(std::unique_ptr<interfaces::McapWriter> writer) : writer_(std::move(writer)) {}
+  static core::Result<std::unique_ptr<RecordingWriter>> open(const std::filesystem::path& path,
+                                                             const RecordingSafety& safety);
+  core::Status attach(const RecordingInfo& info);
   core::Status write(const std::string& topic, const std::string& type, const std::string& kind, std::uint32_t sequence,
                      core::TimeNs log_ns, core::TimeNs publish_ns, std::span<const std::uint8_t> data);
 
@@ -91,6 +126,15 @@ class RecordingWriter {
   MessageIndex next_index_ = 0;
 };
 
+/// Where one of several files begins.
+struct PartStart {
+  std::uint64_t number = 0;
+  bool goes_on = false;  ///< The file before was read, and nothing is missing between the two.
+  /// Else the belief from which to go on, for snapshot_from_text(); "" = the file has none, or is not read from its
+  /// beginning.
+  std::string snapshot;
+};
+
 /// One entry of a recording in its order.
 struct RecordedEntry {
   interfaces::ReceivedMessage message;  ///< `cdr` holds the JSON text of entries that are JSON.
@@ -98,6 +142,9 @@ struct RecordedEntry {
   /// Of a robot message, as when it was written, whatever was lost before it. In a recording of another program,
   /// or one whose description is damaged: its place among those that are read.
   MessageIndex index = 0;
+  /// Of the first entry that is new in a file after the first one of its recording. What comes before it of a file that
+  /// does not go on is repeated.
+  std::shared_ptr<const PartStart> part = nullptr;
 };
 
 struct RecordingReadOptions {
@@ -108,6 +155,7 @@ struct RecordingReadOptions {
   /// be used, or not as it was; of what came after `to`, nothing.
   double from = 0.0;
   double to = std::numeric_limits<double>::infinity();
+  bool all_parts = false;  ///< Of a recording of several files, also those after this one (parts_after()).
 };
 
 /// Reads our recordings, and those of ROS 2 (interfaces::BagReader).
@@ -133,12 +181,20 @@ class RecordingReader {
   }
   /// What could not be read, and what could not be checked: a sentence each, empty = nothing. Complete at the end.
   std::string loss_text() const;
-  std::string unchecked_text() const { return reader_->unchecked_text(); }
-  std::optional<std::uint64_t> message_count() const { return reader_->message_count(); }
+  std::string unchecked_text() const;
+  /// Nothing where it is not known: of several files before the last is reached.
+  std::optional<std::uint64_t> message_count() const {
+    return parts_.empty() ? reader_->message_count() : std::nullopt;
+  }
 
  private:
-  RecordingReader(std::unique_ptr<interfaces::BagReader> reader, const RecordingReadOptions& options)
-      : reader_(std::move(reader)), options_(options) {}
+  explicit RecordingReader(const RecordingReadOptions& options) : options_(options) {}
+  core::Status open_file(const std::filesystem::path& path);
+  /// False at the end.
+  core::Result<bool> open_next_part();
+  /// Whether a repeated message is read.
+  bool is_needed_again(const interfaces::McapChannel& channel, core::TimeNs log_ns) const;
+  void mark_start(RecordedEntry& entry);
   MessageIndex index_of(std::uint32_t sequence);
   /// Whether a message of the robot is read although it came before `from`.
   bool is_needed_later(const interfaces::McapChannel& channel, double before) const;
@@ -147,6 +203,11 @@ class RecordingReader {
 
   std::unique_ptr<interfaces::BagReader> reader_;
   RecordingReadOptions options_;
+  std::vector<std::filesystem::path> parts_;  // still to come
+  std::filesystem::path path_;
+  RecordingPart part_;                    // of the file that is read
+  std::shared_ptr<PartStart> starts_;     // of the next entry that is new
+  std::string lost_, unchecked_;          // of the files before
   std::optional<core::TimeNs> first_ns_;  // when the first message came
   double last_at_ = 0.0;                  // s after it, of the latest message
   RecordingInfo info_;

@@ -33,6 +33,9 @@ struct ReplaySummary {
   std::uint64_t skipped = 0;  ///< Frames.
   std::string last_skip;      ///< Why the last frame was, if no step came after it.
   bool followed_step_records = false;
+  /// Why the steps of a recording's later file, or of one after a gap, were not compared: it holds no belief to go on
+  /// from, so that one began anew; "" = there is no such file, or it does.
+  std::string began_anew;
   std::uint64_t compared = 0;  ///< Steps whose belief was compared with the recorded one.
   std::uint64_t different = 0;
   std::optional<std::uint64_t> first_different_step;

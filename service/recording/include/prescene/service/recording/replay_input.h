@@ -42,6 +42,11 @@ class ReplayInput {
   /// What it was made with, but for the topics, camera and filter of `settings` where it says nothing. kInvalidInput
   /// for recorded settings that make no sense.
   core::Result<TrackerSettings> recorded_settings() const;
+  /// How the recording is read, and whether it begins in a later file of several.
+  const RecordingReadOptions& read_options() const { return read_; }
+  bool begins_later() const { return info_.part.number > 0; }
+  /// The next file of the recording, which is not read; empty where there is none.
+  const std::filesystem::path& goes_on_in() const { return goes_on_in_; }
   bool has_settings() const { return !info_.settings.empty(); }
   /// The seed that the recording was made with: it repeats its bits.
   std::uint64_t seed_or(std::uint64_t seed) const { return info_.seed == 0 ? seed : info_.seed; }
@@ -53,6 +58,7 @@ class ReplayInput {
  private:
   std::filesystem::path path_;
   RecordingReadOptions read_;
+  std::filesystem::path goes_on_in_;
   std::optional<interfaces::FrameFolder> folder_;  // else a recording
   RecordingInfo info_;
   std::string scene_text_;

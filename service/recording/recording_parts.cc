@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// The files of a recording that goes on in several.
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <string>
+#include <system_error>
+
+#include "prescene/interfaces/mcap/mcap_reader.h"
+#include "prescene/service/recording/recording.h"
+#include "recording_format.h"
+
+namespace prescene::service {
+
+std::filesystem::path part_path(const std::filesystem::path& first, std::uint64_t number) {
+  if (number == 0) return first;
+  std::string digits = std::to_string(number);
+  digits.insert(0, 4 - std::min<std::size_t>(4, digits.size()), '0');
+  std::filesystem::path path = first;
+  return path.replace_filename(first.stem().string() + "_" + digits + first.extension().string());
+}
+
+namespace {
+
+/// The files beside a recording's first that are called as its parts are, by number.
+std::map<std::uint64_t, std::filesystem::path> files_called_parts(const std::filesystem::path& first) {
+  std::map<std::uint64_t, std::filesystem::path> files;
+  const std::filesystem::path folder = first.parent_path().empty() ? "." : first.parent_path();
+  const std::string begin = first.stem().string() + "_";
+  std::error_code none;
+  for (std::filesystem::directory_iterator file(folder, none), end; !none && file != end; file.increment(none)) {
+    const std::string stem = file->path().stem().string();
+    if (!stem.starts_with(begin) || file->path().extension() != first.extension()) continue;
+    std::uint64_t number = 0;
+    const char* last = stem.data() + stem.size();
+    const auto [stop, error] = std::from_chars(stem.data() + begin.size(), last, number);
+    if (error != std::errc() || stop != last || number == 0) continue;
+    if (part_path(first, number).filename() == file->path().filename())
+      files.emplace(number, first.parent_path() / file->path().filename());
+  }
+  return files;
+}
+
+}  // namespace
+
+std::filesystem::path unused_recording_path(const std::filesystem::path& path) {
+  std::filesystem::path unused = path;
+  std::error_code none;
+  const auto is_used = [&none](const std::filesystem::path& file) {
+    return std::filesystem::is_regular_file(file, none) ||
+           (!std::filesystem::exists(file, none) && !files_called_parts(file).empty());
+  };
+  for (int i = 2; is_used(unused); ++i) {
+    unused = path;
+    unused.replace_filename(path.stem().string() + "-" + std::to_string(i) + path.extension().string());
+  }
+  return unused;
+}
+
+std::vector<std::filesystem::path> parts_after(const std::filesystem::path& path, const RecordingPart& part,
+                                               std::size_t most) {
+  std::vector<std::filesystem::path> after;
+  if (part.series.empty()) return after;
+  std::filesystem::path first = path;
+  if (part.number > 0) {
+    const std::string end = part_path("", part.number).string();  // "_0007"
+    const std::string stem = path.stem().string();
+    if (!stem.ends_with(end)) return after;
+    first.replace_filename(stem.substr(0, stem.size() - end.size()) + path.extension().string());
+  }
+  interfaces::McapReaderOptions nothing_but_metadata;
+  nothing_but_metadata.topics = {""};
+  nothing_but_metadata.salvage = true;
+  nothing_but_metadata.check_data = false;
+  for (const auto& [number, file] : files_called_parts(first)) {
+    if (after.size() >= most) break;
+    if (number <= part.number) continue;
+    const auto reader = interfaces::McapReader::open(file, nothing_but_metadata);
+    if (!reader) continue;
+    for (const interfaces::McapMetadata& metadata : (*reader)->metadata()) {
+      const auto series = metadata.values.find(kSeriesKey);
+      if (metadata.name != kMetadataName || series == metadata.values.end() || series->second != part.series) continue;
+      after.push_back(file);
+      break;
+    }
+  }
+  return after;
+}
+
+}  // namespace prescene::service

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings that go on in file after file: whatever the moments of the changes, all files together hold each message
+// once, and each replays to the recorded bits, alone or after those before it.
+#include "prescene/service/recording/rolling_recording.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <set>
+#include <thread>
+
+#include "prescene/belief/json.h"
+#include "prescene/core/random.h"
+#include "prescene/interfaces/mcap/mcap_reader.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/recording/recording_overview.h"
+#include "prescene/service/recording/replay.h"
+#include "prescene/service/tracking/topics.h"
+#include "tests/service/recorded_box.h"
+#include "tests/support/paths.h"
+
+namespace prescene::service::rolling_recording_test {
+namespace {
+
+using std::filesystem::path;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A box in a hand that moves, over a table, on which another box stands.
+constexpr const char* kScene = R"(name: held
+duration: 2.0
+models:
+  box: {box: [0.08, 0.06, 0.1], mass: 0.4}
+supports:
+  table: {box: [0.8, 0.8, 0.04], pose: {position: [0, 0, -0.02]}}
+robot:
+  hand:
+    parts: [{box: [0.05, 0.05, 0.04], position: [0, 0, 0.02]}]
+    timeline:
+      - {time: 0.0, position: [-0.1, 0.0, 0.2]}
+      - {time: 2.0, position: [0.1, 0.0, 0.2]}
+objects:
+  held: {model: box, held_by: hand, pose: {position: [-0.1, 0, 0.15], normal: {position: [0.01, 0.01, 0]}}}
+  other: {model: box, pose: {position: [0.05, 0.15, 0.05], normal: {position: [0.01, 0.01, 0]}}}
+camera:
+  width: 80
+  height: 60
+  fov_deg: 55
+  look: {from: [0.55, -0.5, 0.5], at: [0, 0, 0.08]}
+)";
+
+/// What was recorded of a robot, as the messages come.
+std::vector<interfaces::ReceivedMessage> messages_of(const path& robot) {
+  std::vector<interfaces::ReceivedMessage> messages;
+  const auto reader = RecordingReader::open(robot);
+  EXPECT_TRUE(reader.ok());
+  for (auto entry = (*reader)->next(); entry.ok() && *entry; entry = (*reader)->next())
+    if (!(*entry)->is_json) messages.push_back((*entry)->message);
+  return messages;
+}
+
+class RollingRecordingLaws : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(tests::record_scene(kScene, {"scene.yaml", kScene, 1, ""}, 15.0, file("robot.mcap")).ok());
+    messages_ = messages_of(file("robot.mcap"));
+    ASSERT_GT(messages_.size(), 100u);
+    // It waits over several changes, and acts in the end.
+    interfaces::ReceivedMessage control = messages_[20];
+    control.topic = kControlTopic;
+    control.type = "std_msgs/msg/String";
+    control.cdr =
+        interfaces::encode_cdr(interfaces::RosString{R"({"actions": [{"time": 1.2, "release": {"object": "held"}}]})"});
+    messages_.insert(messages_.begin() + 20, control);
+    const auto scene = load_scene_text(kScene, "scene.yaml", {});
+    ASSERT_TRUE(scene.ok());
+    scene_ = *scene;
+  }
+  path file(const std::string& name) const { return folder_.path() / name; }
+  path part(std::uint64_t number) const { return part_path(file("run.mcap"), number); }
+
+  std::unique_ptr<RollingRecording> begin(const RollingOptions& options = {}) {
+    auto recording = RollingRecording::create(file("run.mcap"), {"scene.yaml", kScene, 1, "", FilesOfScene{}}, options);
+    EXPECT_TRUE(recording.ok()) << recording.status().message();
+    return *std::move(recording);
+  }
+  std::unique_ptr<Tracker> tracker() {
+    auto made = Tracker::create(scene_, {}, 1, backends_);
+    EXPECT_TRUE(made.ok());
+    return *std::move(made);
+  }
+  static void go_on_in_next_file(RollingRecording& recording, Tracker& tracker) {
+    while (!recording.is_change_due()) std::this_thread::yield();
+    tracker.measure_cameras_anew();
+    recording.change(
+        [snapshot = tracker.snapshot(), scene = tracker.scene()] { return snapshot_text(snapshot, scene); });
+  }
+  /// Tracks and records as the live service does, but for its threads; `before` is called with the number of each
+  /// message before it comes.
+  void serve(RollingRecording& recording, const std::function<void(std::size_t number, Tracker&)>& before) {
+    const auto tracks = tracker();
+    for (std::size_t i = 0; i < messages_.size(); ++i) {
+      before(i, *tracks);
+      const MessageIndex index = recording.write(messages_[i]);
+      EXPECT_EQ(index, i);
+      EXPECT_TRUE(tracks->take_in(messages_[i], index).ok());
+      while (const auto step = tracks->step(messages_[i].received_ns)) {
+        steps_.push_back(step->record.belief_hash);
+        if (recording.is_on()) ++recorded_steps_;
+        recording.write_json(kStepTopic, belief::json_text(to_json(step->record)), messages_[i].received_ns);
+      }
+      if (const auto oldest = tracks->oldest_needed()) recording.need_images_from(*oldest);
+      recording.write_due(messages_[i].received_ns);
+    }
+  }
+  /// The same with changes before the messages of these numbers.
+  void serve_with_changes(const std::set<std::size_t>& changes, const RollingOptions& options = {}) {
+    const auto recording = begin(options);
+    serve(*recording, [&](std::size_t number, Tracker& tracks) {
+      if (!changes.contains(number)) return;
+      recording->ask_for_change();
+      go_on_in_next_file(*recording, tracks);
+    });
+    EXPECT_TRUE(recording->close().ok());
+    EXPECT_EQ(recording->state().files, changes.size() + 1);
+  }
+  ReplaySummary replayed(const path& from, bool all_parts) {
+    const auto tracks = tracker();
+    RecordingReadOptions options;
+    options.all_parts = all_parts;
+    const auto summary = replay_recording(from, options, *tracks, {}, {}, {}, {});
+    EXPECT_TRUE(summary.ok()) << summary.status().message();
+    EXPECT_EQ(summary->different, 0u) << from << ", step " << summary->first_different_step.value_or(0);
+    return *summary;
+  }
+
+  tests::ScratchDir folder_;
+  std::vector<interfaces::ReceivedMessage> messages_;
+  std::shared_ptr<const belief::Scene> scene_;
+  core::ThreadPool pool_{1};
+  Backends backends_{pool_};
+  std::vector<std::string> steps_;
+  std::size_t recorded_steps_ = 0;
+};
+
+std::set<std::size_t> random_changes(std::size_t among, int count, std::uint64_t seed) {
+  core::RandomStream stream(seed, core::Purpose::kTest);
+  std::set<std::size_t> changes;
+  while (std::ssize(changes) < count)
+    changes.insert(30 + static_cast<std::size_t>(stream.uniform() * static_cast<double>(among - 30)));
+  return changes;
+}
+
+TEST_F(RollingRecordingLaws, EachFileReplaysToTheRecordedBitsAloneAndAfterOthers) {
+  serve_with_changes(random_changes(messages_.size(), 4, 1));
+  ASSERT_GE(steps_.size(), 25u);
+  std::uint64_t alone = 0;
+  for (std::uint64_t number = 0; number <= 4; ++number) {
+    const ReplaySummary one = replayed(part(number), false);
+    EXPECT_EQ(one.began_anew, "") << number;
+    EXPECT_EQ(one.loss, "") << number;
+    alone += one.compared;
+    const ReplaySummary rest = replayed(part(number), true);
+    EXPECT_EQ(rest.compared, steps_.size() - (alone - one.compared)) << number;
+  }
+  EXPECT_EQ(alone, steps_.size());
+}
+
+TEST_F(RollingRecordingLaws, AllFilesTogetherHoldEachMessageOnce) {
+  serve_with_changes(random_changes(messages_.size(), 5, 2));
+  const auto all = RecordingReader::open(file("run.mcap"), {.all_parts = true});
+  ASSERT_TRUE(all.ok()) << all.status().message();
+  std::size_t number = 0, steps = 0;
+  for (;;) {
+    const auto entry = (*all)->next();
+    ASSERT_TRUE(entry.ok()) << entry.status().message();
+    if (!*entry) break;
+    if ((*entry)->is_json) {
+      ++steps;
+      continue;
+    }
+    ASSERT_LT(number, messages_.size());
+    EXPECT_EQ((*entry)->index, number);
+    EXPECT_EQ((*entry)->message.topic, messages_[number].topic);
+    EXPECT_EQ((*entry)->message.received_ns, messages_[number].received_ns);
+    EXPECT_EQ((*entry)->message.cdr, messages_[number].cdr);
+    ++number;
+  }
+  EXPECT_EQ(number, messages_.size());
+  EXPECT_EQ(steps, steps_.size());
+  EXPECT_EQ((*all)->loss_text(), "");
+  // And in what the files themselves say.
+  std::size_t robots = 0;
+  for (std::uint64_t part_number = 0; part_number <= 5; ++part_number) {
+    const auto reader = interfaces::McapReader::open(part(part_number));
+    ASSERT_TRUE(reader.ok());
+    for (auto message = (*reader)->next(); message.ok() && *message; message = (*reader)->next()) {
+      const auto& channel = (*reader)->channels()[static_cast<std::size_t>((*message)->channel)];
+      robots += channel.metadata.contains("prescene") ? 0 : 1;
+    }
+  }
+  EXPECT_EQ(robots, messages_.size());
+}
+
+TEST_F(RollingRecordingLaws, CutAnywhereAFileReplaysToItsEndAndThoseBeforeItAreWhole) {
+  serve_with_changes({messages_.size() / 3, 2 * messages_.size() / 3});
+  const std::uint64_t before = replayed(part(0), false).compared + replayed(part(1), false).compared;
+  const auto bytes = static_cast<double>(std::filesystem::file_size(part(2)));
+  int anew = 0;
+  for (int i = 1; i < 16; ++i) {
+    SCOPED_TRACE(i);
+    const path cut = folder_.path() / ("cut" + std::to_string(i));
+    std::filesystem::create_directory(cut);
+    for (std::uint64_t number = 0; number <= 2; ++number)
+      std::filesystem::copy_file(part(number), cut / part(number).filename());
+    std::filesystem::resize_file(cut / part(2).filename(), static_cast<std::uintmax_t>(bytes * i / 16.0));
+    const ReplaySummary all = replayed(cut / "run.mcap", true);
+    EXPECT_GE(all.compared, before);
+    EXPECT_NE(all.loss, "");
+    const ReplaySummary alone = replayed(cut / part(2).filename(), false);
+    if (alone.began_anew.empty()) {
+      EXPECT_EQ(alone.compared, all.compared - before);
+    } else {
+      ++anew;
+      EXPECT_EQ(alone.compared, 0u);
+    }
+  }
+  EXPECT_LT(anew, 15) << "a file holds the belief soon after its beginning";
+}
+
+TEST_F(RollingRecordingLaws, GoesOnInANewFileAfterWritingFailed) {
+  const auto recording = begin({.part = {}, .pause = 0.0, .room = 0});
+  serve(*recording, [&](std::size_t number, Tracker& tracks) {
+    if (number == 80) recording->fail(core::unavailable("run.mcap: no space left on device"));
+    if (number != 120) return;
+    EXPECT_EQ(recording->state().failure, "run.mcap: no space left on device");
+    EXPECT_EQ(recording->state().lost_messages, 40u);
+    go_on_in_next_file(*recording, tracks);
+    EXPECT_TRUE(recording->is_on());
+    EXPECT_EQ(recording->state().failure, "");
+  });
+  EXPECT_EQ(recording->state().interruptions, 1u);
+  EXPECT_EQ(recording->state().tries, 1u);
+  EXPECT_EQ(recording->close().message(), "run.mcap: no space left on device") << "it is told in the end";
+  const std::uint64_t first = replayed(part(0), false).compared, second = replayed(part(1), false).compared;
+  EXPECT_GT(first, 0u);
+  EXPECT_GT(second, 0u);
+  EXPECT_EQ(first + second, recorded_steps_);
+  const ReplaySummary all = replayed(part(0), true);
+  EXPECT_EQ(all.compared, recorded_steps_) << "the belief is taken up after the gap";
+  EXPECT_EQ(all.began_anew, "");
+}
+
+TEST_F(RollingRecordingLaws, BeginsNoFileWithoutRoomOrOverAnotherOne) {
+  {
+    const auto recording = begin({.part = {}, .pause = 0.0, .room = std::uint64_t{1} << 62});
+    recording->fail(core::unavailable("full"));
+    for (int i = 0; i < 3; ++i) {
+      recording->write(messages_[static_cast<std::size_t>(i)]);
+      EXPECT_FALSE(recording->is_change_due());
+    }
+    EXPECT_EQ(recording->state().tries, 3u);
+    EXPECT_THAT(recording->state().failure, HasSubstr("are free; from"));
+    EXPECT_FALSE(recording->close().ok());
+  }
+  EXPECT_FALSE(std::filesystem::exists(part(1)));
+
+  std::filesystem::remove(part(0));
+  const auto recording = begin({.part = {}, .pause = 0.0});
+  std::filesystem::copy_file(file("robot.mcap"), part(1));
+  const auto bytes = std::filesystem::file_size(part(1));
+  const auto tracks = tracker();
+  recording->ask_for_change();
+  go_on_in_next_file(*recording, *tracks);
+  EXPECT_EQ(recording->state().file, part(2));
+  EXPECT_TRUE(recording->close().ok());
+  EXPECT_EQ(std::filesystem::file_size(part(1)), bytes);
+  const auto reader = RecordingReader::open(part(0));
+  ASSERT_TRUE(reader.ok());
+  EXPECT_EQ(parts_after(part(0), (*reader)->info().part), std::vector<path>{part(2)}) << "the other is not of it";
+}
+
+TEST_F(RollingRecordingLaws, BeginsANewFileByTimeAndBySize) {
+  for (const PartLimits& limits : {PartLimits{.seconds = 0.5}, PartLimits{.bytes = 300'000}}) {
+    SCOPED_TRACE(limits.seconds);
+    steps_.clear();
+    const auto recording = begin({.part = limits, .safety = {0.05, 0.0}, .pause = 0.0});
+    std::uint64_t waited = 0;
+    serve(*recording, [&](std::size_t, Tracker& tracks) {
+      if (!recording->is_change_due()) return;
+      ++waited;
+      go_on_in_next_file(*recording, tracks);
+    });
+    EXPECT_TRUE(recording->close().ok());
+    EXPECT_GE(waited, 1u);
+    EXPECT_EQ(recording->state().files, waited + 1);
+    const ReplaySummary all = replayed(part(0), true);
+    EXPECT_EQ(all.compared, steps_.size());
+    for (std::uint64_t number = 0; number <= waited; ++number) std::filesystem::remove(part(number));
+  }
+}
+
+TEST_F(RollingRecordingLaws, RemovesTheOldestAndTheOthersReplay) {
+  serve_with_changes({60, 100, 140, 180}, {.part = {.keep_bytes = 1}});
+  for (std::uint64_t number = 0; number <= 4; ++number)
+    EXPECT_EQ(std::filesystem::exists(part(number)), number >= 3) << number;
+  EXPECT_GT(replayed(part(3), true).compared, 0u);
+  EXPECT_EQ(unused_recording_path(file("run.mcap")), file("run-2.mcap")) << "its files are not written over";
+}
+
+TEST_F(RollingRecordingLaws, AFileBeginsAnewFromALaterMomentAndSaysNothingOfBits) {
+  serve_with_changes({100});
+  const auto tracks = tracker();
+  const auto summary = replay_recording(part(1), {.from = 0.3}, *tracks, {}, {}, {}, {});
+  ASSERT_TRUE(summary.ok()) << summary.status().message();
+  EXPECT_FALSE(summary->followed_step_records);
+  EXPECT_GT(summary->steps, 0u) << "the static transforms and the camera info are there";
+}
+
+TEST_F(RollingRecordingLaws, AFileIsDescribedByWhatIsNewInIt) {
+  serve_with_changes({100});
+  const auto of_all = overview_of(file("robot.mcap"), {}, {}), later = overview_of(part(1), {}, {});
+  ASSERT_TRUE(of_all.ok() && later.ok());
+  std::uint64_t robots = 0;
+  for (const RecordedTopic& topic : later->topics)
+    if (topic.of == "robot") robots += topic.messages;
+  EXPECT_EQ(robots, messages_.size() - 100);
+  EXPECT_EQ(later->transforms.size(), of_all->transforms.size()) << "the static ones, too";
+  for (const std::string& problem : later->problems) EXPECT_THAT(problem, Not(HasSubstr("could be read")));
+}
+
+// What is found is in no scene file: its file says so instead of promising bits.
+TEST_F(RollingRecordingLaws, ABeliefThatItsSceneCannotHoldIsNotWritten) {
+  const auto tracks = tracker();
+  auto scene = std::make_shared<belief::Scene>(*scene_);
+  scene->supports.push_back(scene->supports.front());
+  scene->supports.back().name = "found";
+  auto belief = std::make_shared<belief::Belief>(*tracks->belief());
+  belief->scene = scene;
+  const auto text = snapshot_text({belief, {}, {}}, scene_);
+  EXPECT_EQ(text.status().code(), core::StatusCode::kUnsupported);
+}
+
+}  // namespace
+}  // namespace prescene::service::rolling_recording_test
