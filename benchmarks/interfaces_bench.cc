@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the bus and recordings cost: from writing a frame to the belief that is published of it, a recorder's share of a
-// core and its loss when it is killed, and how fast a recording is replayed.
+// core and its loss when it is killed, how fast a recording is replayed, and what the live view costs who tracks.
 //
 //   bench_interfaces [--quick] [--only=PART] [--seconds=N] [--domain=N] [--benchmark_out=PATH]
 //
-// --only: bus, recorder or replay. --seconds: of each measurement at 30 Hz (30; quick 8). The service, the recorder and
-// the reader by Cyclone's own interface are processes of their own; the robot that writes is this one.
+// --only: bus, recorder, replay or view. --seconds: of each measurement at 30 Hz (30; quick 8). The service, the
+// recorder and the reader by Cyclone's own interface are processes of their own; the robot that writes is this one.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -298,14 +299,50 @@ core::Status measure_replay(const std::filesystem::path& path, int runs, Report*
   return core::ok_status();
 }
 
+constexpr int kPages = 20;
+constexpr int kViewPort = 18765;
+
+/// A step's time with pages at the live view over that without, in phases that alternate, so that what else the machine
+/// does falls on both.
+core::Status measure_view(const Frames& frames, const Options& arguments, const SharedFigures<FrameTimes>& steps,
+                          SharedFigures<double>& phases, const SharedFigures<double>& taken, Report* report) {
+  PRESCENE_TRY(const auto robot, Robot::join(frames, arguments.domain + 2));
+  if (!robot->wait_for_readers(1)) return core::unavailable("the service with a live view does not listen");
+  robot->write(2.0);  // the first frames find the object
+  constexpr int kPhases = 12;
+  std::array<std::vector<double>, 2> seconds;  // without and with pages
+  for (int phase = 0; phase < kPhases; ++phase) {
+    if (phase > 0) phases.add(0.0);
+    robot->write(0.5);  // pages open, or close
+    const std::size_t begin = steps.all().size();
+    robot->write(arguments.seconds / (kPhases / 2));
+    const std::vector<FrameTimes> all = steps.all();
+    for (std::size_t i = begin; i < all.size(); ++i) seconds[phase % 2].push_back(all[i].step);
+  }
+  phases.add(0.0);
+  robot->write(0.5);
+  double bytes = 0.0;
+  for (const double of_phase : taken.all()) bytes += of_phase;
+  const auto without = milliseconds(seconds[0], 0.5), with = milliseconds(seconds[1], 0.5);
+  report->add({.work = "live view, 20 clients, one frozen: the filter's frame time",
+               .better = Better::kLower,
+               .must = at_most(1.05),
+               .aim = at_most(1.01),
+               .reached = with && without && bytes > 0.0 ? std::optional(*with / *without) : std::nullopt,
+               .unit = "x",
+               .n = static_cast<std::int64_t>(seconds[1].size()),
+               .baseline = "the same service without a page, in phases that alternate: " +
+                           core::rounded_text(without.value_or(0.0)) + " ms, n = " + std::to_string(seconds[0].size()),
+               .why = "medians; the 19 pages that read took " + core::rounded_text(1e-6 * bytes) + " MB"});
+  return core::ok_status();
+}
+
 /// Targets of interfaces that this program does not measure.
 void add_unmeasured(Report* report) {
   const auto add = [&](const char* work, Better better, Goal must, Goal aim, const char* unit, const char* why) {
     report->add(
         {.work = work, .better = better, .must = must, .aim = aim, .reached = std::nullopt, .unit = unit, .why = why});
   };
-  add("live view, 20 clients, one frozen: the filter's frame time", Better::kLower, at_most(1.05), at_most(1.01), "x",
-      "not measured by this program yet");
   add("memory slope over a soak", Better::kLower, at_most(1.0), at_most(0.0), "MB/h", "takes hours");
 }
 
@@ -320,23 +357,31 @@ int run(const Options& arguments) {
     if (!status.ok()) std::fprintf(stderr, "%s\n", status.message().c_str());
   });
   simulator.wait();
-  std::optional<Child> service, bare, recorder;
+  SharedFigures<FrameTimes> viewed_steps(1 << 16);
+  SharedFigures<double> phases(1 << 8), taken(1 << 8);
+  std::optional<Child> service, bare, recorder, viewed, pages;
   if (arguments.measures("bus")) {
     service = Child::start([&](const core::Cancellation& c) { run_service(kScene, arguments.domain, steps, c); });
     bare = Child::start([&](const core::Cancellation& c) { run_bare_reader(arguments.domain, delays, c); });
   }
   if (arguments.measures("recorder"))
     recorder = Child::start([&](const core::Cancellation& c) { run_recorder(arguments.domain + 1, recorded, c); });
+  if (arguments.measures("view")) {
+    viewed = Child::start(
+        [&](const core::Cancellation& c) { run_service(kScene, arguments.domain + 2, viewed_steps, c, kViewPort); });
+    pages = Child::start([&](const core::Cancellation& c) { run_pages(kViewPort, kPages, phases, taken, c); });
+  }
   Report report("interfaces", best_simd_target());
   const auto measure = [&]() -> core::Status {
     PRESCENE_TRY(const Frames frames, read_frames(played));
     if (service) PRESCENE_RETURN_IF_ERROR(measure_bus(frames, arguments, *service, *bare, steps, delays, &report));
     if (recorder) PRESCENE_RETURN_IF_ERROR(measure_recorder(frames, arguments, *recorder, recorded, &report));
+    if (viewed) PRESCENE_RETURN_IF_ERROR(measure_view(frames, arguments, viewed_steps, phases, taken, &report));
     if (!arguments.measures("replay")) return core::ok_status();
     return measure_replay(played, arguments.seconds < 20.0 ? 3 : 9, &report);
   };
   const core::Status status = measure();
-  for (std::optional<Child>* child : {&service, &bare, &recorder})
+  for (std::optional<Child>* child : {&service, &bare, &recorder, &pages, &viewed})
     if (*child) (*child)->stop(true);
   if (!status.ok()) {
     std::fprintf(stderr, "%s\n", core::to_string(status).c_str());
@@ -356,7 +401,7 @@ int main(int count, char** words) {
   arguments.flag("quick", [&] { options.seconds = 8.0; });
   arguments.number("seconds", 0.1, 1e6, &options.seconds);
   arguments.number("domain", 1, 230, &options.domain);
-  arguments.one_of("only", {"bus", "recorder", "replay"}, &options.only);
+  arguments.one_of("only", {"bus", "recorder", "replay", "view"}, &options.only);
   arguments.text("benchmark_out", "PATH", &options.out);
   return arguments.parse(count, words) ? prescene::benchmarks::run(options) : 2;
 }

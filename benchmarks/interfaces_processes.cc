@@ -2,7 +2,10 @@
 #include "benchmarks/interfaces_processes.h"
 
 #include <dds/dds.h>
+#include <netinet/in.h>
+#include <poll.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -14,12 +17,14 @@
 #include <fstream>
 #include <new>
 #include <sstream>
+#include <utility>
 
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
 #include "prescene/service/live/bus_recorder.h"
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/view/live_view.h"
 
 // Compiled into interfaces/dds from its IDL, which gives it its name.
 extern "C" const dds_topic_descriptor_t sensor_msgs_msg_dds__Image__desc;  // NOLINT(readability-identifier-naming)
@@ -93,14 +98,24 @@ double Child::processor_seconds() const {
 }
 
 void run_service(const std::string& scene_yaml, int domain, SharedFigures<FrameTimes>& frames,
-                 const core::Cancellation& cancellation) {
+                 const core::Cancellation& cancellation, int view_port) {
   core::ThreadPool pool;
   service::Backends backends(pool);
   const auto scene = service::load_scene_text(scene_yaml, "bench.yaml", {});
   PRESCENE_CHECK_MSG(scene.ok(), scene.status().message());
   service::LiveSettings settings;
   settings.dds = on_domain(domain, "bench_service");
-  settings.on_step = [&frames](const service::TrackerStep& step, const auto&) {
+  std::unique_ptr<service::LiveView> view;
+  if (view_port != 0) {
+    service::ViewOptions view_options;
+    view_options.port = view_port;
+    auto made = service::LiveView::create(*scene, view_options, log_sink("view"));
+    PRESCENE_CHECK_MSG(made.ok(), made.status().message());
+    view = *std::move(made);
+  }
+  settings.on_step = [&frames, &view](const service::TrackerStep& step,
+                                      const std::shared_ptr<const belief::Belief>& belief) {
+    if (view) view->show({belief, step.observation, step.record.seconds, step.record.degraded});
     const double published = core::seconds_of(core::wall_now_ns() - step.record.stamp_ns);
     frames.add({published - step.record.seconds, published, step.record.seconds});
   };
@@ -108,6 +123,45 @@ void run_service(const std::string& scene_yaml, int domain, SharedFigures<FrameT
   PRESCENE_CHECK_MSG(live.ok(), live.status().message());
   const core::Status ran = (*live)->run(cancellation);
   if (!ran.ok()) std::fprintf(stderr, "service: %s\n", ran.message().c_str());
+}
+
+void run_pages(int view_port, int count, const SharedFigures<double>& phases, SharedFigures<double>& taken,
+               const core::Cancellation& cancellation) {
+  const std::string handshake =
+      "GET / HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(view_port) +
+      "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: prescene.view.v1\r\n\r\n";
+  const auto connected = [&]() -> int {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(view_port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const int page = socket(AF_INET, SOCK_STREAM, 0);
+    const bool is_open = page >= 0 && connect(page, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0 &&
+                         send(page, handshake.data(), handshake.size(), MSG_NOSIGNAL) > 0;
+    PRESCENE_CHECK_MSG(is_open, "the live view does not take a page");
+    return page;
+  };
+  std::vector<pollfd> pages;
+  double bytes = 0.0;
+  std::vector<char> buffer(std::size_t{1} << 16);
+  while (!cancellation.requested()) {
+    const bool wanted = phases.all().size() % 2 == 1;
+    if (wanted && pages.empty()) {
+      for (int i = 0; i < count; ++i) pages.push_back({connected(), static_cast<short>(i == 0 ? 0 : POLLIN), 0});
+    } else if (!wanted && !pages.empty()) {
+      for (const pollfd& page : pages) close(page.fd);
+      pages.clear();
+      taken.add(std::exchange(bytes, 0.0));
+    }
+    poll(pages.data(), pages.size(), 20);
+    for (pollfd& page : pages) {
+      if ((page.revents & POLLIN) == 0) continue;
+      const ssize_t got = recv(page.fd, buffer.data(), buffer.size(), 0);
+      PRESCENE_CHECK_MSG(got > 0, "the live view ended a page that reads");
+      bytes += static_cast<double>(got);
+    }
+  }
 }
 
 void run_recorder(int domain, const std::filesystem::path& path, const core::Cancellation& cancellation) {

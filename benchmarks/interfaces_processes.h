@@ -65,9 +65,13 @@ class Child {
   pid_t id_;
 };
 
-/// Tracks a scene on a domain, with its own recording if a path is given; one figure a step.
+/// Tracks a scene on a domain, with a live view at a port of this machine if one is given; one figure a step.
 void run_service(const std::string& scene_yaml, int domain, SharedFigures<FrameTimes>& frames,
-                 const core::Cancellation& cancellation);
+                 const core::Cancellation& cancellation, int view_port = 0);
+/// So many pages at a live view of this machine, while the number of `phases` is odd. The first of them is frozen: it
+/// takes nothing of what it is sent. `taken` has the bytes that the others took, one figure a phase.
+void run_pages(int view_port, int count, const SharedFigures<double>& phases, SharedFigures<double>& taken,
+               const core::Cancellation& cancellation);
 /// Records the robot's topics to a file.
 void run_recorder(int domain, const std::filesystem::path& path, const core::Cancellation& cancellation);
 /// Takes depth images by Cyclone's C interface alone, and does nothing with them; s from writing to the sample in hand.
