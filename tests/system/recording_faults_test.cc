@@ -182,6 +182,31 @@ TEST_F(RecordingFaults, AFullDiskEndsTheRecordingAndNothingElse) {
               recording().c_str(), read.frames, steps);
 }
 
+TEST_F(RecordingFaults, AFullDiskThatHasRoomAgainIsRecordedTo) {
+  if (!is_full_run()) GTEST_SKIP() << "a new file is tried every 10 s only; the laws of RollingRecording wait for none";
+  const std::string file = path("room.mcap");
+  const auto service = serve({"--record", file});
+  ASSERT_TRUE(tracks(*service)) << log();
+  ASSERT_TRUE(set_limit(service->pid(), RLIMIT_FSIZE, std::filesystem::file_size(file) + 30'000));
+  const auto recording = [&] { return robot_->diagnostics()["recording"]; };
+  ASSERT_TRUE(drive([&] { return recording().starts_with("failed"); })) << recording();
+  ASSERT_TRUE(set_limit(service->pid(), RLIMIT_FSIZE, RLIM_INFINITY));
+  const core::Stopwatch watch;
+  ASSERT_TRUE(drive([&] { return recording() == "on"; })) << recording();
+  const double seconds = watch.seconds();
+  EXPECT_TRUE(tracks(*service)) << log();
+  const std::string lost = robot_->diagnostics()["messages not recorded"];
+  EXPECT_EQ(service->stop(SIGINT), 1) << log();
+  const std::string next = service::part_path(file, 1).string();
+  const int before = replay(file), after = replay(next);
+  EXPECT_GT(after, 0);
+  EXPECT_EQ(replay(file, {"--all-parts"}), before + after);
+  std::printf(
+      "compared: full disk that has room again: recorded to after %.1f s, %s messages were not; %d steps before "
+      "and %d after it replayed to the same bits\n",
+      seconds, lost.c_str(), before, after);
+}
+
 TEST_F(RecordingFaults, AFolderWithoutRightsIsRefusedAtTheStart) {
   std::filesystem::create_directory(path("sealed"));
   std::filesystem::permissions(path("sealed"), std::filesystem::perms(0555));
