@@ -58,6 +58,21 @@ std::shared_ptr<const belief::Scene> scene_from(const ordered_json& json,
   return read;
 }
 
+/// Whether all that the filter finds by its place in one of them is at that place in the other.
+bool are_of_each_other(const belief::Belief& belief, const belief::Scene& scene) {
+  const auto cameras = static_cast<std::size_t>(belief::camera_count(scene));
+  if (belief.objects.size() != scene.objects.size()) return false;
+  if (!(belief.robot.empty() && belief.step == 0) && belief.robot.size() != scene.robot.size()) return false;
+  if (!belief.cameras.empty() && belief.cameras.size() != cameras) return false;
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
+    const belief::ObjectBelief& object = belief.objects[i];
+    if (object.name != scene.objects[i].name || object.model != scene.objects[i].model) return false;
+    if (!object.views.empty() && object.views.size() != cameras) return false;
+    if (object.motion.episode && object.motion.episode->others.size() > belief.objects.size()) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 core::Result<std::string> snapshot_text(const TrackerSnapshot& snapshot,
@@ -91,6 +106,7 @@ core::Result<TrackerSnapshot> snapshot_from_text(const std::string& text,
   if (!json["belief_hash"].is_string() ||
       json["belief_hash"].get<std::string>() != core::hash_text(belief::content_hash(belief)))
     return bad("not the belief that was written");
+  if (!are_of_each_other(belief, *of_belief)) return bad("its objects, hands or cameras are not those of its scene");
   TrackerSnapshot snapshot;
   snapshot.belief = std::make_shared<const belief::Belief>(std::move(belief));
   PRESCENE_TRY(snapshot.controls, WaitingControls::from_json(json["controls"]));

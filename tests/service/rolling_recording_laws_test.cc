@@ -342,5 +342,22 @@ TEST_F(RollingRecordingLaws, ABeliefThatItsSceneCannotHoldIsNotWritten) {
   EXPECT_EQ(text.status().code(), core::StatusCode::kUnsupported);
 }
 
+// A recording comes from outside: what the filter looks for by its place has to be there.
+TEST_F(RollingRecordingLaws, ABeliefThatIsNotOfItsSceneIsRefused) {
+  const auto tracks = tracker();
+  EXPECT_TRUE(snapshot_text({tracks->belief(), {}, {}}, scene_).ok());
+  const auto refused = [&](const auto& change) {
+    auto belief = std::make_shared<belief::Belief>(*tracks->belief());
+    change(*belief);
+    const auto text = snapshot_text({belief, {}, {}}, scene_);
+    EXPECT_THAT(text.status().message(), HasSubstr("not those of its scene"));
+  };
+  refused([](belief::Belief& belief) { belief.objects.pop_back(); });
+  refused([](belief::Belief& belief) { std::swap(belief.objects[0], belief.objects[1]); });
+  refused([](belief::Belief& belief) { belief.robot.resize(2); });
+  refused([](belief::Belief& belief) { belief.cameras.resize(3); });
+  refused([](belief::Belief& belief) { belief.objects[0].views.resize(2); });
+}
+
 }  // namespace
 }  // namespace prescene::service::rolling_recording_test
