@@ -155,8 +155,14 @@ std::optional<Outline::Line> Outline::line_at(const Point& point, const Pose& X_
   return line;
 }
 
-bool Outline::is_nearer(const Line& line, int s, double z) {
-  return z > 0.0 && z < line.p.z() + std::max(0, -s) * line.slope - line.tolerance;
+bool Outline::is_hidden(const Line& line, int s, int x, int y, double z, const rendering::FrameTerms& terms) {
+  const double front = line.p.z() + std::max(0, -s) * line.slope - line.tolerance;
+  if (z > 0.0) return z < front;
+  const double known = terms.known.empty()
+                           ? 0.0
+                           : static_cast<double>(terms.known(std::min(x / terms.step, terms.camera.width - 1),
+                                                             std::min(y / terms.step, terms.camera.height - 1)));
+  return known > 0.0 && known < front;
 }
 
 Outline::Seen Outline::seen_at(const Line& line, int s, int x, int y, double z, const rendering::FrameTerms& terms) {
@@ -184,7 +190,7 @@ void Outline::see_colors(const Pose& X_CO, const geometry::DepthImage& depth, co
       for (int s = first; s <= last; ++s) {
         const auto at = line.pixel(s);
         if (at.x() < 0 || at.y() < 0 || at.x() >= color.width() || at.y() >= color.height()) continue;
-        if (!is_nearer(line, s, depth(at.x(), at.y()))) see(color(at.x(), at.y()), is_inside);
+        if (!is_hidden(line, s, at.x(), at.y(), depth(at.x(), at.y()), terms)) see(color(at.x(), at.y()), is_inside);
       }
     };
     see_from(-innermost, -inner - 1, true);
@@ -227,13 +233,23 @@ OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage
     scores.fill(0);
     by_color.fill(0);
     int objects = 0, backgrounds = 0;
+    std::size_t hole = 0;    // the first pixel of a run without a return that ends here
+    bool is_behind = false;  // something nearer is before that run
     for (int s = -line->reach; s <= line->reach; ++s) {
       const auto at = line->pixel(s);
       if (at.x() < 0 || at.y() < 0 || at.x() >= depth.width() || at.y() >= depth.height()) continue;
       const double z = depth(at.x(), at.y());
       const auto i = static_cast<std::size_t>(s + line->reach);
-      if (has_colors && !is_nearer(*line, s, z)) by_color[i] = colors_->score((*color)(at.x(), at.y()));
-      if (!(z > 0.0)) continue;
+      const bool hidden = is_hidden(*line, s, at.x(), at.y(), z, terms);
+      if (has_colors && !hidden) by_color[i] = colors_->score((*color)(at.x(), at.y()));
+      // What is nearer ends somewhere in the holes beside it, and its colour is neither's.
+      if (hidden) std::fill(by_color.begin() + hole, by_color.begin() + i, 0);
+      if (!(z > 0.0)) {
+        if (is_behind) by_color[i] = 0;
+        continue;
+      }
+      is_behind = hidden;
+      hole = i + 1;
       const Seen seen = seen_at(*line, s, at.x(), at.y(), z, terms);
       objects += seen == Seen::kObject;
       backgrounds += seen == Seen::kBackground;

@@ -100,6 +100,7 @@ extern const ColorLearningOptions options;
 namespace outline_h {
 extern const geometry::PinholeCamera camera;
 extern const geometry::DepthImage depth;
+extern const geometry::ColorImage color;
 extern rendering::Renderer& renderer;
 }  // namespace outline_h
 
@@ -124,6 +125,11 @@ extern const Frame frame;
 extern const geometry::Image<std::uint8_t> explained;
 extern const SegmentationOptions options;
 }  // namespace segmentation_h
+
+namespace support_surfaces_h {
+extern const SupportSurfaces gripper;
+extern const geometry::Pose X_WG;
+}  // namespace support_surfaces_h
 
 namespace support_tracking_h {
 extern belief::Support support;

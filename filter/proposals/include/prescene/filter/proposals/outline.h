@@ -72,8 +72,8 @@ class Outline {
   enum class Seen : std::int8_t { kNothing, kObject, kBackground };
 
   std::optional<Line> line_at(const Point& point, const Pose& X_CO, const rendering::FrameTerms& terms) const;
-  /// Whether a measurement of the line's pixel `s`, at z, is of something in front of the object.
-  static bool is_nearer(const Line& line, int s, double z);
+  /// Whether the line's pixel `s`, at (x, y) with a measurement of z (0 = none), shows something before the object.
+  static bool is_hidden(const Line& line, int s, int x, int y, double z, const rendering::FrameTerms& terms);
   static Seen seen_at(const Line& line, int s, int x, int y, double z, const rendering::FrameTerms& terms);
 
   geometry::PinholeCamera camera_;
