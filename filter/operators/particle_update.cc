@@ -184,7 +184,8 @@ double ParticleUpdate::outline(const Pose& X_WO) const {
 }
 
 double ParticleUpdate::log_overlap(const belief::Particle& particle) const {
-  const SupportSurfaces* solids = particle.mode == belief::MotionMode::kHeld ? context_.supports : context_.solids;
+  const bool is_held = particle.mode == belief::MotionMode::kHeld;
+  const SupportSurfaces* solids = is_held || context_.solids == nullptr ? context_.supports : context_.solids;
   if (solids == nullptr || solids->empty()) return 0.0;
   const double overlap = solids->overlap(*target_.mesh, particle.X_WO, options_.support_tolerance);
   return kLogInSupport * std::min(1.0, overlap / kFullOverlap);

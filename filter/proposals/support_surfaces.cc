@@ -87,8 +87,9 @@ bool SupportSurfaces::inside(const Vector3d& p_W) const {
     const Part& part = *placed.part;
     const Vector3d p = placed.in_part(p_W);
     if (!part.closed || !part.box.contains(p)) return false;
-    // A direction that runs along no edge of things built at right angles.
-    const Vector3d away = p + 2.0 * part.box.diagonal().norm() * Vector3d(0.2673, 0.5345, 0.8018);
+    // A direction that runs along no edge of things built at right angles, nor from the middle of one through a
+    // diagonal of its faces.
+    const Vector3d away = p + 2.0 * part.box.diagonal().norm() * Vector3d(0.27131, 0.53883, 0.79752);
     return crossings(part, p, away) % 2 == 1;
   });
 }

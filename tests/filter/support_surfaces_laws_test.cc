@@ -39,6 +39,18 @@ TEST(SupportSurfaces, InsideABoxIsInside) {
   EXPECT_GT(inside, 300);
 }
 
+// The lengths of whose sides are small whole numbers.
+TEST(SupportSurfaces, TheMiddleOfABoxIsInside) {
+  for (int x = 1; x <= 9; ++x)
+    for (int y = 1; y <= 9; ++y)
+      for (int z = 1; z <= 9; ++z) {
+        SupportSurfaces surfaces;
+        const auto box = rendering::make_render_mesh(geometry::make_mesh(geometry::BoxShape{0.02 * Vector3d(x, y, z)}));
+        surfaces.add(*box, Pose::identity());
+        EXPECT_TRUE(surfaces.inside(Vector3d::Zero())) << x << y << z;
+      }
+}
+
 TEST(SupportSurfaces, ASegmentCrossesAPlateIffItsEndsLieOnBothSides) {
   MeshCache meshes;
   belief::Scene scene;

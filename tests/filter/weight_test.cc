@@ -117,6 +117,31 @@ TEST_F(WeightOfABox, AHiddenPoseInsideASupportWeighsLessThanOneBesideIt) {
   EXPECT_GT(std::exp(particles[0].log_weight), 0.99);
 }
 
+TEST_F(WeightOfABox, AHiddenPoseInsideTheRobotWeighsLessUnlessAHandHoldsIt) {
+  see({plate_in_front()});
+  SupportSurfaces solids = *frame_.surfaces, arm;
+  arm.add(*target_.mesh, Pose::identity());
+  solids.place(arm, X_WO_);
+  for (const auto mode : {belief::MotionMode::kMoving, belief::MotionMode::kHeld}) {
+    std::vector<Particle> particles = particles_at(X_WO_, 1);
+    particles.front().mode = mode;
+    const auto weight_of = [&](const SupportSurfaces* robot) {
+      std::vector<Particle> two = particles;
+      two.push_back(particles_at(X_WO_, 1).front());
+      two.back().mode = belief::MotionMode::kHeld;
+      belief::normalize(two);
+      weight(frame_.terms, target_, frame_.X_WC, 1.0 / 30.0, {}, backends_.tools, {5, core::Purpose::kProposal}, two,
+             {.supports = frame_.surfaces.get(), .solids = robot, .was_unseen = true});
+      return std::exp(two[0].log_weight);
+    };
+    EXPECT_NEAR(weight_of(nullptr), 0.5, 1e-9);
+    if (mode == belief::MotionMode::kHeld)
+      EXPECT_NEAR(weight_of(&solids), 0.5, 1e-9);
+    else
+      EXPECT_LT(weight_of(&solids), 0.01);
+  }
+}
+
 TEST_F(WeightOfABox, WhatWasHiddenStaysHiddenWhereNothingIsExplained) {
   see({plate_in_front()});
   std::vector<Particle> particles = particles_at(X_WO_);

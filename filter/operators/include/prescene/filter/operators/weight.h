@@ -52,7 +52,7 @@ struct ParticleWeight {
 /// What is known of the object besides the frame.
 struct WeightContext {
   const SupportSurfaces* supports = nullptr;  ///< Where hidden poses cannot be; null = anywhere.
-  const SupportSurfaces* solids = nullptr;    ///< The same of what no hand holds.
+  const SupportSurfaces* solids = nullptr;    ///< The same of what no hand holds; null = no more.
   bool was_unseen = false;                    ///< In the frame before.
   /// The full depth image and its camera, for where the object ends in it; null = poses follow depth residuals alone.
   const geometry::DepthImage* depth = nullptr;
