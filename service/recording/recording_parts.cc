@@ -58,7 +58,7 @@ std::filesystem::path unused_recording_path(const std::filesystem::path& path) {
 }
 
 std::vector<std::filesystem::path> parts_after(const std::filesystem::path& path, const RecordingPart& part,
-                                               std::size_t most) {
+                                               std::size_t most, std::vector<PassedOver>* passed_over) {
   std::vector<std::filesystem::path> after;
   if (part.series.empty()) return after;
   std::filesystem::path first = path;
@@ -76,12 +76,14 @@ std::vector<std::filesystem::path> parts_after(const std::filesystem::path& path
     if (after.size() >= most) break;
     if (number <= part.number) continue;
     const auto reader = interfaces::McapReader::open(file, nothing_but_metadata);
-    if (!reader) continue;
-    for (const interfaces::McapMetadata& metadata : (*reader)->metadata()) {
+    const auto is_of_series = [&part](const interfaces::McapMetadata& metadata) {
       const auto series = metadata.values.find(kSeriesKey);
-      if (metadata.name != kMetadataName || series == metadata.values.end() || series->second != part.series) continue;
+      return metadata.name == kMetadataName && series != metadata.values.end() && series->second == part.series;
+    };
+    if (reader && std::any_of((*reader)->metadata().begin(), (*reader)->metadata().end(), is_of_series)) {
       after.push_back(file);
-      break;
+    } else if (passed_over) {
+      passed_over->push_back({file, after.size(), reader.ok()});
     }
   }
   return after;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "prescene/core/text.h"
@@ -10,12 +11,18 @@
 #include "recording_format.h"
 
 namespace prescene::service {
+namespace {
+
+void add_sentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
+
+}  // namespace
 
 core::Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const std::filesystem::path& path,
                                                                      const RecordingReadOptions& options) {
   std::unique_ptr<RecordingReader> reader(new RecordingReader(options));
   PRESCENE_RETURN_IF_ERROR(reader->open_file(path));
-  if (options.all_parts) reader->parts_ = parts_after(path, reader->part_);
+  if (options.all_parts)
+    reader->parts_ = parts_after(path, reader->part_, std::numeric_limits<std::size_t>::max(), &reader->passed_over_);
   return reader;
 }
 
@@ -56,31 +63,55 @@ core::Status RecordingReader::open_file(const std::filesystem::path& path) {
   }
   part_ = info.part;
   if (is_first) info_ = std::move(info);
+  // A belief that nothing new followed was not taken up.
+  if (starts_ && !starts_->goes_on) misses_some_ = true;
   starts_.reset();
   if (part_.number > 0) {
     starts_ = std::make_shared<PartStart>();
     starts_->number = part_.number;
-    starts_->goes_on = !is_first && !part_.after_gap && part_.first_message == next_index_;
+    const bool follows = !is_first && !part_.after_gap && part_.first_message == next_index_;
+    if (!is_first && part_.first_message > next_index_) miss_before(part_.first_message - next_index_);
     const bool is_from_start = !is_first || !(options_.from > 0.0);
-    if (!starts_->goes_on && is_from_start)
+    if ((!follows || misses_some_) && is_from_start)
       if (const auto snapshot = reader_->attachment(kSnapshotName))
         starts_->snapshot.assign(snapshot->data.begin(), snapshot->data.end());
+    starts_->goes_on = follows && starts_->snapshot.empty();
+    if (!starts_->snapshot.empty()) misses_some_ = false;
   }
   next_index_ = part_.first_message;
   return core::ok_status();
 }
 
 core::Result<bool> RecordingReader::open_next_part() {
-  if (!options_.all_parts || parts_.empty()) return false;
+  if (!options_.all_parts || parts_.empty()) {
+    for (const PassedOver& last : std::exchange(passed_over_, {}))
+      if (last.after == opened_parts_ && !last.is_readable)
+        add_sentence(lost_, last.file.filename().string() + ": it can't be read");
+    return false;
+  }
   const auto join = [this](std::string& to, const std::string& text) {
-    if (!text.empty()) to += (to.empty() ? "" : "; ") + path_.filename().string() + ": " + text;
+    if (!text.empty()) add_sentence(to, path_.filename().string() + ": " + text);
   };
-  join(lost_, reader_->loss_text());
+  const std::string lost = reader_->loss_text();
+  misses_some_ = misses_some_ || !lost.empty();
+  join(lost_, lost);
   join(unchecked_, reader_->unchecked_text());
   const std::filesystem::path path = parts_.front();
   parts_.erase(parts_.begin());
   PRESCENE_RETURN_IF_ERROR(open_file(path));
+  ++opened_parts_;
   return true;
+}
+
+void RecordingReader::miss_before(std::uint64_t messages) {
+  std::string sentence = path_.filename().string() + ": " + std::to_string(messages) + " messages before it " +
+                         (part_.after_gap ? "were not recorded" : "are not there");
+  std::string passed;
+  for (const PassedOver& file : passed_over_)
+    if (file.after == opened_parts_) passed += (passed.empty() ? "" : ", ") + file.file.filename().string();
+  if (!passed.empty()) sentence += " (passed over, as they are no readable parts of the recording: " + passed + ")";
+  add_sentence(lost_, sentence);
+  misses_some_ = true;
 }
 
 std::string RecordingReader::unchecked_text() const {
@@ -90,7 +121,7 @@ std::string RecordingReader::unchecked_text() const {
 
 std::string RecordingReader::loss_text() const {
   std::string text = lost_;
-  const auto say = [&text](const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; };
+  const auto say = [&text](const std::string& sentence) { add_sentence(text, sentence); };
   if (const std::string here = reader_->loss_text(); !here.empty()) say(here);
   const auto& channels = reader_->channels();
   const bool is_ours =
@@ -191,7 +222,9 @@ core::Result<std::optional<RecordedEntry>> RecordingReader::next() {
       RecordedEntry entry;
       entry.message = {channel.topic, channel.schema.name, std::move(message->data), message->publish_time_ns,
                        message->log_time_ns};
+      const MessageIndex next_new = next_index_;
       entry.index = index_of(message->sequence);
+      next_index_ = next_new;
       return std::optional<RecordedEntry>(std::move(entry));
     }
     if (!first_ns_) first_ns_ = message->log_time_ns;

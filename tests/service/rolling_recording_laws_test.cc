@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <fstream>
 #include <set>
 #include <thread>
 
@@ -250,6 +251,61 @@ TEST_F(RollingRecordingLaws, GoesOnInANewFileAfterWritingFailed) {
   const ReplaySummary all = replayed(part(0), true);
   EXPECT_EQ(all.compared, recorded_steps_) << "the belief is taken up after the gap";
   EXPECT_EQ(all.began_anew, "");
+}
+
+TEST_F(RollingRecordingLaws, SaysWhichMessagesOfAMissingPartAreNotThere) {
+  serve_with_changes({60, 100, 140});
+  const std::string is_not_there = "run_0002.mcap: 40 messages before it are not there";
+  std::filesystem::rename(part(1), file("aside"));
+  EXPECT_EQ(replayed(part(0), true).loss, is_not_there);
+  const std::string with_name =
+      is_not_there + " (passed over, as they are no readable parts of the recording: run_0001.mcap)";
+  std::ofstream(part(1)).flush();
+  EXPECT_EQ(replayed(part(0), true).loss, with_name) << "it is empty";
+  std::filesystem::copy_file(file("robot.mcap"), part(1), std::filesystem::copy_options::overwrite_existing);
+  EXPECT_EQ(replayed(part(0), true).loss, with_name) << "it is another recording's";
+  std::filesystem::copy_file(file("aside"), part(1), std::filesystem::copy_options::overwrite_existing);
+  EXPECT_EQ(replayed(part(0), true).loss, "");
+
+  std::filesystem::resize_file(part(1), std::filesystem::file_size(part(1)) / 2);
+  EXPECT_THAT(replayed(part(0), true).loss, HasSubstr(" messages before it are not there")) << "it was cut";
+  std::filesystem::copy_file(file("aside"), part(1), std::filesystem::copy_options::overwrite_existing);
+
+  std::ofstream(part(4)).flush();
+  EXPECT_EQ(replayed(part(0), true).loss, "run_0004.mcap: it can't be read");
+}
+
+// The files after a damaged one go on from the belief that they hold, not from what the damage made of it.
+TEST_F(RollingRecordingLaws, TakesUpTheBeliefAfterADamagedPart) {
+  serve_with_changes({messages_.size() / 3, 2 * messages_.size() / 3});
+  const std::uint64_t last = replayed(part(2), false).compared;
+  const auto bytes = static_cast<double>(std::filesystem::file_size(part(1)));
+  std::filesystem::copy_file(part(1), file("aside"));
+  int damaged = 0;
+  for (int i = 1; i < 16; ++i) {
+    SCOPED_TRACE(i);
+    std::filesystem::copy_file(file("aside"), part(1), std::filesystem::copy_options::overwrite_existing);
+    {
+      std::fstream bad(part(1), std::ios::in | std::ios::out | std::ios::binary);
+      bad.seekp(static_cast<std::streamoff>(bytes * i / 16.0));
+      bad << std::string(64, '\x5a');
+    }
+    const auto tracks = tracker();
+    RecordingReadOptions options;
+    options.all_parts = options.salvage = true;
+    const auto all = RecordingReader::open(part(0), options);
+    ASSERT_TRUE(all.ok()) << all.status().message();
+    bool goes_on = true;
+    for (auto entry = (*all)->next(); entry.ok() && *entry; entry = (*all)->next())
+      if ((*entry)->part && (*entry)->part->number == 2) goes_on = (*entry)->part->goes_on;
+    if ((*all)->loss_text().empty()) continue;
+    ++damaged;
+    EXPECT_FALSE(goes_on) << (*all)->loss_text();
+    const auto summary = replay_recording(part(0), options, *tracks, {}, {}, {}, {});
+    ASSERT_TRUE(summary.ok()) << summary.status().message();
+    EXPECT_GE(summary->compared - summary->different, last);
+  }
+  EXPECT_GT(damaged, 5);
 }
 
 TEST_F(RollingRecordingLaws, BeginsNoFileWithoutRoomOrOverAnotherOne) {

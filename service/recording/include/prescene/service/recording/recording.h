@@ -51,10 +51,18 @@ std::filesystem::path unused_recording_path(const std::filesystem::path& path);
 
 /// The file of a recording's part: "run.mcap", "run_0001.mcap", ...
 std::filesystem::path part_path(const std::filesystem::path& first, std::uint64_t number);
+/// A file beside a recording that is called as its parts are and does not say that it belongs to it.
+struct PassedOver {
+  std::filesystem::path file;
+  std::size_t after = 0;     ///< So many of the files of parts_after() come before it.
+  bool is_readable = false;  ///< Else nothing of it can be read.
+};
 /// The files that go on after this one of a recording, in their order: those beside it whose names go on and that say
 /// that they belong to it, at most so many. Empty for a recording that is one file, and for what can't be read.
+/// `passed_over`, if given, gets the others that are called so.
 std::vector<std::filesystem::path> parts_after(const std::filesystem::path& path, const RecordingPart& part,
-                                               std::size_t most = std::numeric_limits<std::size_t>::max());
+                                               std::size_t most = std::numeric_limits<std::size_t>::max(),
+                                               std::vector<PassedOver>* passed_over = nullptr);
 
 /// Whether a channel holds JSON of ours, in std_msgs/String: its metadata says so.
 bool holds_own_json(const interfaces::McapChannel& channel);
@@ -129,7 +137,9 @@ class RecordingWriter {
 /// Where one of several files begins.
 struct PartStart {
   std::uint64_t number = 0;
-  bool goes_on = false;  ///< The file before was read, and nothing is missing between the two.
+  /// The file before was read, and nothing is missing in it or between the two; or something is, and this file holds no
+  /// belief to go on from.
+  bool goes_on = false;
   /// Else the belief from which to go on, for snapshot_from_text(); "" = the file has none, or is not read from its
   /// beginning.
   std::string snapshot;
@@ -192,6 +202,8 @@ class RecordingReader {
   core::Status open_file(const std::filesystem::path& path);
   /// False at the end.
   core::Result<bool> open_next_part();
+  /// To what is lost: so many messages before the file that is read.
+  void miss_before(std::uint64_t messages);
   /// Whether a repeated message is read.
   bool is_needed_again(const interfaces::McapChannel& channel, core::TimeNs log_ns) const;
   void mark_start(RecordedEntry& entry);
@@ -205,9 +217,12 @@ class RecordingReader {
   RecordingReadOptions options_;
   std::vector<std::filesystem::path> parts_;  // still to come
   std::filesystem::path path_;
-  RecordingPart part_;                    // of the file that is read
-  std::shared_ptr<PartStart> starts_;     // of the next entry that is new
-  std::string lost_, unchecked_;          // of the files before
+  RecordingPart part_;                 // of the file that is read
+  std::shared_ptr<PartStart> starts_;  // of the next entry that is new
+  std::string lost_, unchecked_;       // of the files before
+  bool misses_some_ = false;           // since the last belief that was read, or the beginning
+  std::vector<PassedOver> passed_over_;
+  std::size_t opened_parts_ = 0;
   std::optional<core::TimeNs> first_ns_;  // when the first message came
   double last_at_ = 0.0;                  // s after it, of the latest message
   RecordingInfo info_;
