@@ -67,10 +67,11 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   if (!options.record.empty()) {
     options.record = live_recording_path(options.record, context);
     PRESCENE_TRY(recording,
-                 RollingRecording::create(options.record,
-                                          {options.scene, text, context.options().seed,
-                                           belief::json_text(to_json(options.settings.tracker)), std::move(files)},
-                                          {.part = options.parts}, context.log()));
+                 RollingRecording::create(
+                     options.record,
+                     {options.scene, text, context.options().seed, belief::json_text(to_json(options.settings.tracker)),
+                      std::move(files)},
+                     {.part = options.parts, .tf_static = options.settings.tracker.topics.tf_static}, context.log()));
   }
   const auto started_with = [&options](const char* name, ParameterValue value, const char* description) {
     options.settings.started_with.push_back({name, description, std::move(value)});

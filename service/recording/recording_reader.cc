@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/outside_json.h"
 #include "prescene/service/recording/recording.h"
 #include "prescene/service/tracking/topics.h"
 #include "recording_format.h"
@@ -62,7 +64,12 @@ core::Status RecordingReader::open_file(const std::filesystem::path& path) {
     has_attached_scene_ = metadata.values.contains(kAttachedKey);
   }
   part_ = info.part;
-  if (is_first) info_ = std::move(info);
+  if (is_first) {
+    info_ = std::move(info);
+    const auto settings = parse_or_discard(info_.settings, kMostParsedJsonBytes);
+    if (settings.is_object() && settings.contains("tf_static_topic") && settings["tf_static_topic"].is_string())
+      tf_static_ = settings["tf_static_topic"].get<std::string>();
+  }
   // A belief that nothing new followed was not taken up.
   if (starts_ && !starts_->goes_on) misses_some_ = true;
   starts_.reset();
@@ -184,7 +191,8 @@ core::Result<std::optional<RecordedEntry>> RecordingReader::own_json(const inter
 bool RecordingReader::is_needed_later(const interfaces::McapChannel& channel, double before) const {
   constexpr double kTransformSeconds = 10.0;
   if (channel.schema.name == "tf2_msgs/msg/TFMessage")
-    return before <= kTransformSeconds || channel.topic.ends_with("static");
+    return before <= kTransformSeconds ||
+           (tf_static_.empty() ? channel.topic.ends_with("static") : channel.topic == tf_static_);
   if (channel.schema.name == "sensor_msgs/msg/JointState") return before <= kTransformSeconds;
   return channel.schema.name == "sensor_msgs/msg/CameraInfo" || channel.topic == kSettingsTopic;
 }

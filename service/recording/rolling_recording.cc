@@ -56,7 +56,7 @@ core::Result<std::unique_ptr<RollingRecording>> RollingRecording::create(const s
 
 RollingRecording::RollingRecording(std::filesystem::path first, RecordingInfo info, const RollingOptions& options,
                                    core::LogSink log)
-    : first_(std::move(first)), info_(std::move(info)), options_(options), log_(std::move(log)) {
+    : first_(std::move(first)), info_(std::move(info)), options_(options), log_(std::move(log)), repeated_(options.tf_static) {
   state_.file = first_;
   kept_.push_back(first_);
 }

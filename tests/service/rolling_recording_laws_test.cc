@@ -15,6 +15,7 @@
 #include "prescene/core/random.h"
 #include "prescene/interfaces/mcap/mcap_reader.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/service/recording/recording_overview.h"
 #include "prescene/service/recording/replay.h"
 #include "prescene/service/tracking/topics.h"
@@ -363,6 +364,85 @@ TEST_F(RollingRecordingLaws, RemovesTheOldestAndTheOthersReplay) {
     EXPECT_EQ(std::filesystem::exists(part(number)), number >= 3) << number;
   EXPECT_GT(replayed(part(3), true).compared, 0u);
   EXPECT_EQ(unused_recording_path(file("run.mcap")), file("run-2.mcap")) << "its files are not written over";
+}
+
+interfaces::ReceivedMessage transform(const std::string& topic, const std::string& parent, const std::string& child,
+                                      double x, core::TimeNs received_ns) {
+  interfaces::RosTransformStamped stamped;
+  stamped.header.stamp.sec = static_cast<std::int32_t>(received_ns / 1'000'000'000);
+  stamped.header.frame_id = parent;
+  stamped.child_frame_id = child;
+  stamped.transform.translation.x = x;
+  stamped.transform.rotation.w = 1.0;
+  interfaces::RosTfMessage message;
+  message.transforms.push_back(stamped);
+  return {topic, "tf2_msgs/msg/TFMessage", interfaces::encode_cdr(message), received_ns, received_ns};
+}
+
+/// Of each message that a new file repeats, its transform's parent and x.
+std::vector<std::pair<std::string, double>> repeated_by(const RepeatedMessages& repeated) {
+  std::vector<std::pair<std::string, double>> all;
+  EXPECT_TRUE(repeated
+                  .each([&all](const interfaces::ReceivedMessage& message, MessageIndex) {
+                    const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr);
+                    EXPECT_TRUE(tf.ok());
+                    all.emplace_back(tf->transforms.at(0).header.frame_id, tf->transforms[0].transform.translation.x);
+                    return core::ok_status();
+                  })
+                  .ok());
+  return all;
+}
+
+constexpr core::TimeNs kSecondNs = 1'000'000'000;
+
+TEST(RepeatedMessagesTest, TheNewestStaticTransformComesLast) {
+  RepeatedMessages repeated;
+  MessageIndex index = 0;
+  for (const double x : {1.0, 2.0, 1.0})
+    repeated.note(transform("/tf_static", "world", "camera", x, kSecondNs), index++);
+  ASSERT_FALSE(repeated_by(repeated).empty());
+  EXPECT_EQ(repeated_by(repeated).back().second, 1.0);
+  // Published again and again with new stamps: they do not add up, and drive out no other.
+  repeated.note(transform("/tf_static", "world", "base", 5.0, kSecondNs), index++);
+  for (int i = 2; i < 3000; ++i) repeated.note(transform("/tf_static", "world", "camera", i, i * kSecondNs), index++);
+  using Repeated = std::vector<std::pair<std::string, double>>;
+  EXPECT_EQ(repeated_by(repeated), (Repeated{{"world", 1.0}, {"world", 5.0}, {"world", 2999.0}}));
+}
+
+// Which parent a frame has is decided by who came first.
+TEST(RepeatedMessagesTest, AnotherParentDoesNotComeBeforeTheFirst) {
+  RepeatedMessages repeated;
+  repeated.note(transform("/tf_static", "world", "camera", 1.0, kSecondNs), 0);
+  repeated.note(transform("/tf_static", "other", "camera", 2.0, kSecondNs), 1);
+  repeated.note(transform("/tf_static", "world", "camera", 3.0, kSecondNs), 2);
+  using Repeated = std::vector<std::pair<std::string, double>>;
+  EXPECT_EQ(repeated_by(repeated), (Repeated{{"world", 1.0}, {"other", 2.0}, {"world", 3.0}}));
+}
+
+TEST(RepeatedMessagesTest, StaticIsWhatComesOnTheTopicThatIsNamed) {
+  RepeatedMessages repeated("/robot/fixed");
+  repeated.note(transform("/robot/fixed", "world", "camera", 1.0, kSecondNs), 0);
+  repeated.note(transform("/robot/not_static", "world", "hand", 2.0, kSecondNs), 1);
+  repeated.note(transform("/tf", "world", "arm", 3.0, 30 * kSecondNs), 2);
+  using Repeated = std::vector<std::pair<std::string, double>>;
+  EXPECT_EQ(repeated_by(repeated), (Repeated{{"world", 1.0}, {"world", 3.0}}));
+}
+
+TEST(RepeatedMessagesTest, AReaderThatBeginsLaterReadsTheStaticTransformsOfTheTopicThatTheSettingsName) {
+  const tests::ScratchDir folder;
+  const path recording = folder.path() / "fixed.mcap";
+  auto writer = RecordingWriter::create(recording, {"", "", 1, R"({"tf_static_topic": "/robot/fixed"})"});
+  ASSERT_TRUE(writer.ok()) << writer.status().message();
+  EXPECT_TRUE((*writer)->write(transform("/robot/fixed", "world", "camera", 1.0, kSecondNs)).ok());
+  EXPECT_TRUE((*writer)->write(transform("/robot/not_static", "world", "hand", 2.0, kSecondNs)).ok());
+  EXPECT_TRUE((*writer)->write(transform("/tf", "world", "arm", 3.0, 30 * kSecondNs)).ok());
+  EXPECT_TRUE((*writer)->close().ok());
+  const auto reader = RecordingReader::open(recording, {.from = 25.0});
+  ASSERT_TRUE(reader.ok()) << reader.status().message();
+  std::vector<std::string> topics;
+  for (auto entry = (*reader)->next(); entry.ok() && *entry; entry = (*reader)->next())
+    topics.push_back((*entry)->message.topic);
+  EXPECT_EQ(topics, (std::vector<std::string>{"/robot/fixed", "/tf"}));
 }
 
 TEST_F(RollingRecordingLaws, AFileBeginsAnewFromALaterMomentAndSaysNothingOfBits) {

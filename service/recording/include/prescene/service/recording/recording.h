@@ -229,6 +229,7 @@ class RecordingReader {
   bool has_info_ = false;
   bool info_is_damaged_ = false;
   bool has_attached_scene_ = false;
+  std::string tf_static_;            // the topic of the static transforms, if the recording says it
   bool is_numbered_ = false;         // sequences are the lower bits of the messages' numbers
   std::uint64_t too_long_json_ = 0;  // left out
   std::uint64_t damaged_json_ = 0;   // the same

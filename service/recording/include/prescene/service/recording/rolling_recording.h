@@ -54,6 +54,8 @@ struct RollingOptions {
   double pause = 10.0;
   /// Bytes that have to be free on the disk for such a try.
   std::uint64_t room = std::uint64_t{64} << 20;
+  /// The topic of the static transforms.
+  std::string tf_static = InputTopics{}.tf_static;
 };
 
 /// How a recording is.
