@@ -140,7 +140,7 @@ void add_part_options(CLI::App& verb, PartLimits& limits) {
       ->capture_default_str();
   verb.add_option_function<double>(
           "--part-megabytes", [&limits, bytes](const double& megabytes) { limits.bytes = bytes(megabytes); },
-          "The same when a file has so many megabytes")
+          "The same when a file has so many megabytes of what is new in it")
       ->check(number_between(1.0, 1e9));
   verb.add_option_function<double>(
           "--keep-megabytes", [&limits, bytes](const double& megabytes) { limits.keep_bytes = bytes(megabytes); },

@@ -46,6 +46,7 @@ core::Result<std::unique_ptr<RollingRecording>> RollingRecording::create(const s
   PRESCENE_TRY(auto writer, RecordingWriter::create(path, info, options.safety));
   std::unique_ptr<RollingRecording> recording(new RollingRecording(path, std::move(info), options, std::move(log)));
   recording->writer_ = std::move(writer);
+  recording->own_bytes_ = recording->writer_->size().bytes;
   try {
     recording->thread_ = std::thread([raw = recording.get()] { raw->run(); });
   } catch (const std::system_error& error) {
@@ -56,7 +57,11 @@ core::Result<std::unique_ptr<RollingRecording>> RollingRecording::create(const s
 
 RollingRecording::RollingRecording(std::filesystem::path first, RecordingInfo info, const RollingOptions& options,
                                    core::LogSink log)
-    : first_(std::move(first)), info_(std::move(info)), options_(options), log_(std::move(log)), repeated_(options.tf_static) {
+    : first_(std::move(first)),
+      info_(std::move(info)),
+      options_(options),
+      log_(std::move(log)),
+      repeated_(options.tf_static) {
   state_.file = first_;
   kept_.push_back(first_);
 }
@@ -141,7 +146,7 @@ bool RollingRecording::is_full(core::TimeNs now_ns) const {
   const PartLimits& limits = options_.part;
   const interfaces::McapWriter::Size size = writer_->size();
   return (limits.seconds > 0.0 && now_ns - began_ns_ >= core::ns_of(limits.seconds)) ||
-         (limits.bytes > 0 && size.bytes >= limits.bytes) || size.index_bytes >= kMostIndexBytes ||
+         (limits.bytes > 0 && size.bytes >= own_bytes_ + limits.bytes) || size.index_bytes >= kMostIndexBytes ||
          size.chunks >= kMostChunks;
 }
 
@@ -207,11 +212,11 @@ void RollingRecording::take_results() {
       core::log(log_, core::LogLevel::kWarning, why_not);
       continue;
     }
-    ++state_.removed;
-    std::erase(kept_, path);
+    if (std::erase(kept_, path) > 0) ++state_.removed;
   }
   if (!snapshot || !writer_ || snapshot->first != number_) return;
   if (snapshot->second) {
+    own_bytes_ += snapshot->second->size();
     take(writer_->write_snapshot(*snapshot->second));
     return;
   }
@@ -276,6 +281,8 @@ void RollingRecording::change(Snapshot snapshot) {
     take(repeated_.each([this](const interfaces::ReceivedMessage& message, MessageIndex index) {
       return writer_->write_again(message, index);
     }));
+  if (writer_) take(writer_->flush());
+  if (writer_) own_bytes_ = writer_->size().bytes;
   if (snapshot && writer_) {
     work([this, snapshot = std::move(snapshot), number = number_] {
       auto text = result_of<core::Result<std::string>>(snapshot);

@@ -366,6 +366,39 @@ TEST_F(RollingRecordingLaws, RemovesTheOldestAndTheOthersReplay) {
   EXPECT_EQ(unused_recording_path(file("run.mcap")), file("run-2.mcap")) << "its files are not written over";
 }
 
+TEST_F(RollingRecordingLaws, CountsEachFileThatWasRemovedOnce) {
+  const auto recording = begin({.part = {.keep_bytes = 1}, .pause = 0.0});
+  const auto tracks = tracker();
+  for (int i = 0; i < 40; ++i) {
+    recording->ask_for_change();
+    go_on_in_next_file(*recording, *tracks);
+  }
+  EXPECT_TRUE(recording->close().ok());
+  std::uint64_t there = 0;
+  for (std::uint64_t number = 0; number <= 40; ++number) there += std::filesystem::exists(part(number)) ? 1 : 0;
+  EXPECT_EQ(there, 2u);
+  EXPECT_EQ(recording->state().removed, 41 - there);
+}
+
+// A file that carries much is not full at its beginning.
+TEST_F(RollingRecordingLaws, TheSizeOfAPartIsThatOfWhatIsNewInIt) {
+  constexpr std::uint64_t kAttached = 1'000'000, kNew = 200'000;
+  auto made = RollingRecording::create(
+      file("run.mcap"),
+      {"scene.yaml", kScene, 1, "", FilesOfScene{{"big.bin", std::vector<std::uint8_t>(kAttached, 7)}}},
+      {.part = {.bytes = kNew}, .safety = {0.05, 0.0}, .pause = 0.0});
+  ASSERT_TRUE(made.ok()) << made.status().message();
+  const auto recording = *std::move(made);
+  serve(*recording, [&](std::size_t, Tracker& tracks) {
+    if (recording->is_change_due()) go_on_in_next_file(*recording, tracks);
+  });
+  EXPECT_TRUE(recording->close().ok());
+  const std::uint64_t files = recording->state().files;
+  EXPECT_GE(files, 2u);
+  for (std::uint64_t number = 0; number + 1 < files; ++number)
+    EXPECT_GE(std::filesystem::file_size(part(number)), kAttached + kNew) << number;
+}
+
 interfaces::ReceivedMessage transform(const std::string& topic, const std::string& parent, const std::string& child,
                                       double x, core::TimeNs received_ns) {
   interfaces::RosTransformStamped stamped;

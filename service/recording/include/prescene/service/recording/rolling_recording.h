@@ -42,6 +42,7 @@ namespace prescene::service {
 /// (interfaces::McapReader): at half of them.
 struct PartLimits {
   double seconds = 0.0;
+  /// Of what is new in the file: without the attached files, what is repeated, and the belief.
   std::uint64_t bytes = 0;
   /// The oldest files of this recording are removed when all of them take more than this; the newest two never are.
   std::uint64_t keep_bytes = 0;
@@ -140,6 +141,7 @@ class RollingRecording {
   MessageIndex next_index_ = 0;
   core::TimeNs now_ns_ = 0, began_ns_ = 0;
   std::optional<core::TimeNs> tried_ns_;
+  std::uint64_t own_bytes_ = 0;    // of the file: attached, repeated, and the belief
   std::uint64_t number_ = 0;       // of the file that was begun last
   std::uint64_t next_number_ = 1;  // that no file was made with
   bool is_making_ready_ = false, is_asked_ = false, has_gap_ = false;
