@@ -75,9 +75,9 @@ struct AugmentOptions {
 };
 
 /// Looks for an object in the frame (`terms`: with everything else known put in); on success a share of its particles
-/// is put there and holds most of the weight. `current`: the evidence of where it is thought to be. Nothing is taken for
-/// a find that is inside of a support or, deeper than the object is believed to be, of a body of the robot; nor one out
-/// of reach while the object is seen well enough where it is thought to be.
+/// is put there and holds most of the weight. `current`: the evidence of where it is thought to be. Nothing is taken
+/// for a find that is inside of a support or, deeper than the object is believed to be, of a body of the robot; nor one
+/// out of reach while the object is seen well enough where it is thought to be.
 bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
              const rendering::PoseEvidence& current, const AugmentOptions& options, const WeightOptions& weighting,
              const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
