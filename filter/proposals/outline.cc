@@ -81,6 +81,16 @@ Crossing crossing_of(std::span<const int> scores) {
   return {mean, square / total - mean * mean};
 }
 
+/// Of an image in terms.camera, at a pixel of the full image.
+double at_pixel(const geometry::DepthImage& image, const rendering::FrameTerms& terms, int x, int y) {
+  return image(std::min(x / terms.step, terms.camera.width - 1), std::min(y / terms.step, terms.camera.height - 1));
+}
+
+/// m, depth of what is known to be seen there besides the object; 0 = nothing.
+double known_at(const rendering::FrameTerms& terms, int x, int y) {
+  return terms.known.empty() ? 0.0 : at_pixel(terms.known, terms, x, y);
+}
+
 }  // namespace
 
 Outline::Outline(const SearchTarget& target, const Pose& X_CO, const geometry::PinholeCamera& camera,
@@ -156,21 +166,16 @@ std::optional<Outline::Line> Outline::line_at(const Point& point, const Pose& X_
 }
 
 bool Outline::is_hidden(const Line& line, int s, int x, int y, double z, const rendering::FrameTerms& terms) {
-  const double front = line.p.z() + std::max(0, -s) * line.slope - line.tolerance;
+  const double front = line.expected(s) - line.tolerance;
   if (z > 0.0) return z < front;
-  const double known = terms.known.empty()
-                           ? 0.0
-                           : static_cast<double>(terms.known(std::min(x / terms.step, terms.camera.width - 1),
-                                                             std::min(y / terms.step, terms.camera.height - 1)));
+  const double known = known_at(terms, x, y);
   return known > 0.0 && known < front;
 }
 
 Outline::Seen Outline::seen_at(const Line& line, int s, int x, int y, double z, const rendering::FrameTerms& terms) {
-  const int low_x = std::min(x / terms.step, terms.camera.width - 1);
-  const int low_y = std::min(y / terms.step, terms.camera.height - 1);
-  const double known = terms.known.empty() ? 0.0 : static_cast<double>(terms.known(low_x, low_y));
-  const double peak = terms.absent_peak(low_x, low_y);
-  const double expected = line.p.z() + std::max(0, -s) * line.slope;
+  const double known = known_at(terms, x, y);
+  const double peak = at_pixel(terms.absent_peak, terms, x, y);
+  const double expected = line.expected(s);
   const bool is_object = std::abs(z - expected) < line.tolerance;
   const bool is_known =
       (known > 0.0 && std::abs(z - known) < kKnownTolerance) || (peak > 0.0 && std::abs(z - peak) < kKnownTolerance);
@@ -240,7 +245,7 @@ OutlineEquations Outline::linearise(const Pose& X_CO, const geometry::DepthImage
       if (at.x() < 0 || at.y() < 0 || at.x() >= depth.width() || at.y() >= depth.height()) continue;
       const double z = depth(at.x(), at.y());
       const auto i = static_cast<std::size_t>(s + line->reach);
-      const bool hidden = is_hidden(*line, s, at.x(), at.y(), z, terms);
+      const bool hidden = has_colors && is_hidden(*line, s, at.x(), at.y(), z, terms);
       if (has_colors && !hidden) by_color[i] = colors_->score((*color)(at.x(), at.y()));
       // What is nearer ends somewhere in the holes beside it, and its colour is neither's.
       if (hidden) std::fill(by_color.begin() + hole, by_color.begin() + i, 0);

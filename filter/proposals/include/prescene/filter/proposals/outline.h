@@ -7,6 +7,8 @@
 //   OutlineEquations equations = outline.linearise(X_CO, depth, terms, &color);
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -65,6 +67,8 @@ class Outline {
     int reach = 0;           ///< Pixels to either side.
     double slope = 0.0;      ///< m a pixel, how the depth changes on the object's side.
     double tolerance = 0.0;  ///< m, within which a measurement is the object's.
+    /// m, depth of the object's surface at pixel `s`, as far as it goes on.
+    double expected(int s) const { return p.z() + std::max(0, -s) * slope; }
     Eigen::Vector2i pixel(int s) const {
       return {static_cast<int>(std::lround(u.x() + s * n.x())), static_cast<int>(std::lround(u.y() + s * n.y()))};
     }
