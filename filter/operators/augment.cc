@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "hidden_places.h"
 #include "particle_update.h"
@@ -95,14 +96,21 @@ bool is_same_place(const Pose& X_CO, const Pose& other_X_CO, const SearchTarget&
   return shift < kSameShift && turn < kSameTurn;
 }
 
-/// Whether what is seen at a pose would do as a find there.
-bool is_seen_there(const Pose& X_CO, const rendering::PoseEvidence& evidence, const rendering::FrameTerms& terms,
-                   const SearchTarget& target, const AugmentOptions& options, const WeightOptions& weighting,
-                   const FilterTools& tools) {
-  if (evidence.log_ratio < options.accept_log_ratio || evidence.hit_share() < kLeastHits) return false;
+/// Whether what a find must say for each pixel depends on what the frame can say there.
+enum class Limit { kScaled, kInFull };
+
+/// Nats per pixel of what is seen at a pose, if it would do as a find there of which `needed` is asked; else nothing.
+std::optional<double> evidence_of_find(const Pose& X_CO, const rendering::PoseEvidence& seen, double needed,
+                                       Limit limit, const rendering::FrameTerms& terms, const SearchTarget& target,
+                                       const AugmentOptions& options, const WeightOptions& weighting,
+                                       const FilterTools& tools) {
+  if (seen.log_ratio < options.accept_log_ratio || seen.hit_share() < kLeastHits) return std::nullopt;
   const double outline = outline_at(terms, target, X_CO, weighting, tools);
-  const double scale = evidence_scale(expected_evidence_of(terms, target, X_CO, *tools.renderer).of_visible);
-  return supported_evidence(evidence, outline, weighting) >= scale * options.accept_evidence;
+  const double scale = limit == Limit::kInFull
+                           ? 1.0
+                           : evidence_scale(expected_evidence_of(terms, target, X_CO, *tools.renderer).of_visible);
+  const double evidence = supported_evidence(seen, outline, weighting);
+  return evidence < scale * needed ? std::nullopt : std::optional(evidence);
 }
 
 }  // namespace
@@ -143,8 +151,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
 
   const rendering::PoseEvidence& e = found.evidence;
   const double shown = e.in_view > 0 ? static_cast<double>(e.visible) / e.in_view : 0.0;
-  if (e.log_ratio < options.accept_log_ratio || e.log_ratio < current.log_ratio + options.min_gain) return false;
-  if (shown < kLeastShown || e.hit_share() < kLeastHits) return false;
+  if (e.log_ratio < current.log_ratio + options.min_gain || shown < kLeastShown) return false;
   // Of a tracked object, the particles know that place better than a search of one frame.
   if (object.state == belief::TrackState::kTracked && is_same_place(found.X_CO, X_CO, target)) return false;
   const Pose X_WO = frame.X_WC * found.X_CO;
@@ -155,20 +162,21 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
     return frame.solids.overlap(*target.mesh, pose, weighting.support_tolerance);
   };
   if (in_solids(X_WO) > std::max(kMostOverlap, in_solids(last.X_WO))) return false;
-  const double outline = outline_at(terms, target, found.X_CO, weighting, tools);
+  const auto as_find = [&](const Pose& at, const rendering::PoseEvidence& seen, double needed, Limit limit) {
+    return evidence_of_find(at, seen, needed, limit, terms, target, options, weighting, tools);
+  };
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double reach = std::max(0.10, options.reach_speed * unseen);
   const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;
   // More of an arm that no scene knows may look like the object than is seen of it in that arm's hand. But what is seen
   // where it is believed to be cannot be out of reach of there.
-  if (far && is_seen_there(X_CO, current, terms, target, options, weighting, tools)) return false;
-  const double needed = options.accept_evidence + (far ? options.far_evidence : 0.0);
+  if (far && as_find(X_CO, current, options.accept_evidence, Limit::kScaled)) return false;
   // Far from where it was, what is seen has to speak for itself.
-  const double scale =
-      far ? 1.0 : evidence_scale(expected_evidence_of(terms, target, found.X_CO, *tools.renderer).of_visible);
-  const double evidence = supported_evidence(e, outline, weighting);
-  if (evidence < scale * needed) return false;
-  object.evidence_per_pixel = evidence;
+  const std::optional<double> evidence =
+      far ? as_find(found.X_CO, e, options.accept_evidence + options.far_evidence, Limit::kInFull)
+          : as_find(found.X_CO, e, options.accept_evidence, Limit::kScaled);
+  if (!evidence) return false;
+  object.evidence_per_pixel = *evidence;
   inject(X_WO, spread, stream.for_purpose(core::Purpose::kStartBelief), object);
   return true;
 }
