@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <exception>
 #include <utility>
 
 #include "disk.h"
@@ -69,8 +70,13 @@ void BackgroundSync::run() {
     if (changed_.wait_until(lock, *waiting_since_ + interval_, [this] { return ended_; })) return;
     asked_since_ = std::exchange(waiting_since_, std::nullopt);
     lock.unlock();
-    Status synced = sync_content(descriptor_, path_);
-    if (synced.ok()) synced = sync_and_close_folder(std::exchange(folder_, -1), path_);
+    Status synced;
+    try {
+      synced = sync_content(descriptor_, path_);
+      if (synced.ok()) synced = sync_and_close_folder(std::exchange(folder_, -1), path_);
+    } catch (const std::exception&) {  // The disk failed, and there is no memory for the words.
+      synced = Status(core::StatusCode::kUnavailable, "out of memory");
+    }
     lock.lock();
     if (status_.ok()) status_ = std::move(synced);
     asked_since_.reset();

@@ -45,6 +45,14 @@ Status write_error(const std::filesystem::path& path, int error) {
   return core::unavailable(path.string() + ": cannot be written: " + reason(error) + remedy);
 }
 
+/// For locks that belong to an open file, not to the process: they go when it is closed.
+struct flock whole_file() {
+  struct flock all {};
+  all.l_type = F_WRLCK;
+  all.l_whence = SEEK_SET;
+  return all;
+}
+
 }  // namespace
 
 Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::size_t max_bytes) {
@@ -74,6 +82,14 @@ Result<std::filesystem::path> create_beside(const std::filesystem::path& path, c
     if (errno != EEXIST) return write_error(named.empty() ? path : named, errno);
   }
   return write_error(named.empty() ? path : named, EEXIST);
+}
+
+Result<bool> create_new_file(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor < 0 && errno == EEXIST) return false;
+  if (descriptor < 0) return write_error(path, errno);
+  ::close(descriptor);
+  return true;
 }
 
 Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
@@ -140,6 +156,21 @@ Result<OutputFile> OutputFile::create(const std::filesystem::path& path, const s
   file.descriptor_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file.descriptor_ >= 0) return file;
   return write_error(file.named_, errno);
+}
+
+void OutputFile::mark_in_use() {
+  PRESCENE_CHECK(is_open());
+  struct flock all = whole_file();
+  static_cast<void>(::fcntl(descriptor_, F_OFD_SETLK, &all));
+}
+
+bool is_in_use(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) return errno != ENOENT;
+  struct flock all = whole_file();
+  const bool is_known = ::fcntl(descriptor, F_OFD_GETLK, &all) == 0;
+  ::close(descriptor);
+  return !is_known || all.l_type != F_UNLCK;
 }
 
 Status OutputFile::write(std::span<const std::uint8_t> bytes) {

@@ -2,6 +2,7 @@
 #include "prescene/interfaces/mcap/mcap_writer.h"
 
 #include <algorithm>
+#include <exception>
 #include <limits>
 #include <set>
 #include <utility>
@@ -258,6 +259,7 @@ Result<std::unique_ptr<McapWriter>> McapWriter::create(const std::filesystem::pa
   impl->options = options;
   impl->compressor = Compressor(options.compression);
   PRESCENE_TRY(impl->file, OutputFile::create(path));
+  impl->file.mark_in_use();
   if (options.sync_interval.count() > 0) {
     PRESCENE_TRY(impl->sync, BackgroundSync::start(path, options.sync_interval));
   }
@@ -372,8 +374,12 @@ Status McapWriter::close() {
   Impl& impl = *impl_;
   if (impl.closed) return impl.failure;
   impl.closed = true;
-  static_cast<void>(impl.end_chunk());
-  if (impl.failure.ok()) static_cast<void>(impl.write_summary());
+  try {
+    static_cast<void>(impl.end_chunk());
+    if (impl.failure.ok()) static_cast<void>(impl.write_summary());
+  } catch (const std::exception&) {  // In words that need no memory.
+    impl.failure = Status(core::StatusCode::kResourceExhausted, "out of memory");
+  }
   if (impl.failure.ok() && impl.sync) impl.failure = impl.file.sync();
   impl.sync.reset();
   const Status closed = impl.file.close();

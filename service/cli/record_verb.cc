@@ -101,10 +101,11 @@ core::Status record_bus(RecordOptions& options, VerbContext& context) {
     info.scene_file = options.scene;
     info.files = std::move(files);
   }
-  PRESCENE_TRY(
-      const auto recording,
-      RollingRecording::create(output, std::move(info),
-                               {.part = options.parts, .tf_static = cameras.front().topics.tf_static}, context.log()));
+  PRESCENE_TRY(const auto recording,
+               RollingRecording::create(
+                   output, std::move(info),
+                   {.part = options.parts, .tf_static = cameras.front().topics.tf_static, .asked = options.output},
+                   context.log()));
   PRESCENE_TRY(const std::uint64_t messages,
                record_topics(options.dds, cameras, context.cancellation(), context.log(), *recording));
   context.print({{"recording", output}, {"messages", messages}, {"simulated", false}},

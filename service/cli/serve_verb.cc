@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "prescene/belief/json.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
@@ -65,13 +66,14 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   options.settings.learned_file = options.learned;
   std::unique_ptr<RollingRecording> recording;
   if (!options.record.empty()) {
-    options.record = live_recording_path(options.record, context);
+    const std::string asked = std::exchange(options.record, live_recording_path(options.record, context));
     PRESCENE_TRY(recording,
                  RollingRecording::create(
                      options.record,
                      {options.scene, text, context.options().seed, belief::json_text(to_json(options.settings.tracker)),
                       std::move(files)},
-                     {.part = options.parts, .tf_static = options.settings.tracker.topics.tf_static}, context.log()));
+                     {.part = options.parts, .tf_static = options.settings.tracker.topics.tf_static, .asked = asked},
+                     context.log()));
   }
   const auto started_with = [&options](const char* name, ParameterValue value, const char* description) {
     options.settings.started_with.push_back({name, description, std::move(value)});

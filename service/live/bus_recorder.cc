@@ -2,6 +2,8 @@
 #include "prescene/service/live/bus_recorder.h"
 
 #include <algorithm>
+#include <exception>
+#include <string>
 
 #include "prescene/core/clock.h"
 #include "prescene/service/live/inbox.h"
@@ -39,7 +41,7 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
     core::log(log, core::LogLevel::kInfo,
               "recording " + domain + (camera.name.empty() ? "" : " camera " + camera.name) + ": " +
                   topics_text(camera.topics));
-  std::uint64_t messages = 0;
+  std::uint64_t messages = 0, without_memory = 0;
   core::TimeNs last_ns = 0;
   std::vector<CameraInput> waits_for = cameras;  // those whose depth images have not come
   bool was_late = false;
@@ -54,11 +56,19 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
       // Never back, so that the order by time is the order of arrival.
       message.received_ns = last_ns = std::max(last_ns, message.received_ns);
       std::erase_if(waits_for, [&](const CameraInput& camera) { return camera.topics.depth == message.topic; });
-      recording.write(message);
       ++messages;
+      try {
+        recording.write(message);
+      } catch (const std::exception&) {
+        ++without_memory;
+      }
     }
-    recording.write_due(core::steady_now_ns());
-    if (recording.is_change_due()) recording.change(nullptr);
+    try {
+      recording.write_due(core::steady_now_ns());
+      if (recording.is_change_due()) recording.change(nullptr);
+    } catch (const std::exception& error) {
+      core::log(log, core::LogLevel::kWarning, std::string("the recording was not looked after: ") + error.what());
+    }
     const bool is_late = recording.seconds_at_risk() > kTooLongAtRisk;
     if (is_late && !was_late)
       core::log(log, core::LogLevel::kWarning,
@@ -71,8 +81,12 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
               std::to_string(inbox.dropped() + node->dropped_samples()) +
                   " messages were lost: the disk or the network is too slow for these topics");
   }
+  if (without_memory > 0) {
+    core::log(log, core::LogLevel::kWarning,
+              std::to_string(without_memory) + " messages were not recorded: there was no memory for them");
+  }
   PRESCENE_RETURN_IF_ERROR(recording.close());
-  return messages;
+  return messages - without_memory;
 }
 
 }  // namespace prescene::service

@@ -271,6 +271,7 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
   node->stop_receiving();
   listener.move_to(result);
   result.loss = reader->loss_text();
+  result.missing = reader->missing_text();
   result.unchecked = reader->unchecked_text();
   return result;
 }

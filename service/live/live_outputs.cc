@@ -46,13 +46,17 @@ void LiveService::Impl::record_step(const StepRecord& step) {
 
 void LiveService::Impl::look_after_recording(core::TimeNs now_ns) {
   if (!recording) return;
-  recording->write_due(now_ns);
-  if (const auto oldest = tracker->oldest_needed()) recording->need_images_from(*oldest);
-  if (!recording->is_change_due()) return;
-  tracker->measure_cameras_anew();
-  recording->change([snapshot = tracker->snapshot(), scene_of_it = tracker->scene()] {
-    return snapshot_text(snapshot, scene_of_it);
-  });
+  try {
+    recording->write_due(now_ns);
+    if (const auto oldest = tracker->oldest_needed()) recording->need_images_from(*oldest);
+    if (!recording->is_change_due()) return;
+    tracker->measure_cameras_anew();
+    recording->change([snapshot = tracker->snapshot(), scene_of_it = tracker->scene()] {
+      return snapshot_text(snapshot, scene_of_it);
+    });
+  } catch (const std::exception& error) {
+    note_failure("what the recording needs", error);
+  }
 }
 
 void LiveService::Impl::check_sent(const core::Status& status) {

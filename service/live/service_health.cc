@@ -16,7 +16,7 @@ std::uint64_t losses_of(const ServiceHealth& health) {
   std::uint64_t sum = health.lost_on_bus + health.unsent + health.failures + health.tf_forgotten + health.tf_late +
                       health.dropped_controls + health.idle_controls + health.unreadable_questions +
                       health.questions.unanswered + health.questions.failed + health.recording.interruptions +
-                      health.recording.lost_messages;
+                      health.recording.lost_messages + health.recording.not_repeated + health.recording.unfinished;
   for (const auto& [topic, count] : health.dropped_in_inbox) {
     const auto& images = health.image_topics;
     if (std::find(images.begin(), images.end(), topic) == images.end()) sum += count;
@@ -91,7 +91,7 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
   const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
   const auto& [file, files, removed_files, interruptions, tries, lost_messages, failure, first_failure, without_belief,
-               not_removed] = recording;
+               not_removed, not_repeated, unfinished, last_unfinished] = recording;
   static_cast<void>(image_topics);         // says what of dropped_in_inbox is a loss
   static_cast<void>(nothing_came);         // is in the text
   static_cast<void>(is_recording);         // told, like
@@ -133,6 +133,9 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
           {"first interruption", first_failure},
           {"tries to go on recording", std::to_string(tries)},
           {"messages not recorded", std::to_string(lost_messages)},
+          {"messages not repeated", std::to_string(not_repeated)},
+          {"recording jobs unfinished", std::to_string(unfinished)},
+          {"last unfinished recording job", last_unfinished},
           {"keeps what it learns", learned_text(health)},
           {"simulated time, s", clock_text(health)},
           {"since the last frame, s", seconds_since_frame ? core::fixed_text(*seconds_since_frame, 1) : ""},

@@ -8,6 +8,7 @@
 
 #include "prescene/interfaces/bytes/crc32.h"
 #include "prescene/interfaces/mcap/mcap.h"
+#include "prescene/service/recording/recording.h"
 
 namespace prescene::service {
 
@@ -43,6 +44,8 @@ inline constexpr const char* kAttachedKey = "attached_files";
 inline constexpr const char* kAgainKind = "again";
 // Present where a recording goes on in several files.
 inline constexpr const char* kSeriesKey = "series";
+/// What the metadata says of a recording that goes on in several files; defaults where that is nothing.
+RecordingPart part_from(const interfaces::McapMetadata& metadata);
 inline constexpr const char* kSnapshotName = "prescene/belief.json";
 
 inline std::string kind_of(const interfaces::McapChannel& channel) {

@@ -2,6 +2,7 @@
 // The files of a recording that goes on in several.
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
 #include <map>
 #include <string>
 #include <system_error>
@@ -21,6 +22,14 @@ std::filesystem::path part_path(const std::filesystem::path& first, std::uint64_
 }
 
 namespace {
+
+interfaces::McapReaderOptions nothing_but_metadata() {
+  interfaces::McapReaderOptions options;
+  options.topics = {""};
+  options.salvage = true;
+  options.check_data = false;
+  return options;
+}
 
 /// The files beside a recording's first that are called as its parts are, by number.
 std::map<std::uint64_t, std::filesystem::path> files_called_parts(const std::filesystem::path& first) {
@@ -47,14 +56,40 @@ std::filesystem::path unused_recording_path(const std::filesystem::path& path) {
   std::filesystem::path unused = path;
   std::error_code none;
   const auto is_used = [&none](const std::filesystem::path& file) {
+    const auto type = std::filesystem::symlink_status(file, none).type();
+    // A link that leads nowhere keeps its name.
+    if (type == std::filesystem::file_type::symlink && !std::filesystem::exists(file, none)) return true;
     return std::filesystem::is_regular_file(file, none) ||
-           (!std::filesystem::exists(file, none) && !files_called_parts(file).empty());
+           (type == std::filesystem::file_type::not_found && !files_called_parts(file).empty());
   };
   for (int i = 2; is_used(unused); ++i) {
     unused = path;
     unused.replace_filename(path.stem().string() + "-" + std::to_string(i) + path.extension().string());
   }
   return unused;
+}
+
+RecordingPart part_from(const interfaces::McapMetadata& metadata) {
+  const auto value = [&metadata](const char* key) {
+    const auto found = metadata.values.find(key);
+    return found == metadata.values.end() ? std::string() : found->second;
+  };
+  const auto number = [&value](const char* key) { return std::strtoull(value(key).c_str(), nullptr, 10); };
+  RecordingPart part;
+  part.series = value(kSeriesKey);
+  part.number = number("part");
+  part.first_message = number("first_message");
+  part.began_ns = std::min<core::TimeNs>(static_cast<core::TimeNs>(number("began_ns")), kLatestRecordedNs);
+  part.after_gap = value("after_gap") == "yes";
+  part.bounded_as = value("bounded_as");
+  return part;
+}
+
+core::Result<RecordingPart> part_of(const std::filesystem::path& file) {
+  PRESCENE_TRY(const auto reader, interfaces::McapReader::open(file, nothing_but_metadata()));
+  for (const interfaces::McapMetadata& metadata : reader->metadata())
+    if (metadata.name == kMetadataName && metadata.values.contains(kSeriesKey)) return part_from(metadata);
+  return RecordingPart();
 }
 
 std::vector<std::filesystem::path> parts_after(const std::filesystem::path& path, const RecordingPart& part,
@@ -68,22 +103,14 @@ std::vector<std::filesystem::path> parts_after(const std::filesystem::path& path
     if (!stem.ends_with(end)) return after;
     first.replace_filename(stem.substr(0, stem.size() - end.size()) + path.extension().string());
   }
-  interfaces::McapReaderOptions nothing_but_metadata;
-  nothing_but_metadata.topics = {""};
-  nothing_but_metadata.salvage = true;
-  nothing_but_metadata.check_data = false;
   for (const auto& [number, file] : files_called_parts(first)) {
     if (after.size() >= most) break;
     if (number <= part.number) continue;
-    const auto reader = interfaces::McapReader::open(file, nothing_but_metadata);
-    const auto is_of_series = [&part](const interfaces::McapMetadata& metadata) {
-      const auto series = metadata.values.find(kSeriesKey);
-      return metadata.name == kMetadataName && series != metadata.values.end() && series->second == part.series;
-    };
-    if (reader && std::any_of((*reader)->metadata().begin(), (*reader)->metadata().end(), is_of_series)) {
+    const auto says = part_of(file);
+    if (says && says->series == part.series) {
       after.push_back(file);
     } else if (passed_over) {
-      passed_over->push_back({file, after.size(), reader.ok()});
+      passed_over->push_back({file, after.size(), says.ok()});
     }
   }
   return after;

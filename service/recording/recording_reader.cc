@@ -50,16 +50,11 @@ core::Status RecordingReader::open_file(const std::filesystem::path& path) {
       const auto found = metadata.values.find(key);
       return found == metadata.values.end() ? std::string() : found->second;
     };
-    const auto number = [&value](const char* key) { return std::strtoull(value(key).c_str(), nullptr, 10); };
     info.scene_file = value("scene_file");
     info.scene_text = value("scene_text");
     info.settings = value("settings");
-    info.seed = number("seed");
-    info.part.series = value(kSeriesKey);
-    info.part.number = number("part");
-    info.part.first_message = number("first_message");
-    info.part.began_ns = std::min<core::TimeNs>(static_cast<core::TimeNs>(number("began_ns")), kLatestRecordedNs);
-    info.part.after_gap = value("after_gap") == "yes";
+    info.seed = std::strtoull(value("seed").c_str(), nullptr, 10);
+    info.part = part_from(metadata);
     is_numbered_ = value(kNumberedKey) == kNumbered;
     has_attached_scene_ = metadata.values.contains(kAttachedKey);
   }
@@ -93,7 +88,8 @@ core::Result<bool> RecordingReader::open_next_part() {
   if (!options_.all_parts || parts_.empty()) {
     for (const PassedOver& last : std::exchange(passed_over_, {}))
       if (last.after == opened_parts_ && !last.is_readable)
-        add_sentence(lost_, last.file.filename().string() + ": it can't be read");
+        for (std::string* text : {&lost_, &missing_})
+          add_sentence(*text, last.file.filename().string() + ": it can't be read");
     return false;
   }
   const auto join = [this](std::string& to, const std::string& text) {
@@ -114,10 +110,15 @@ void RecordingReader::miss_before(std::uint64_t messages) {
   std::string sentence = path_.filename().string() + ": " + std::to_string(messages) + " messages before it " +
                          (part_.after_gap ? "were not recorded" : "are not there");
   std::string passed;
-  for (const PassedOver& file : passed_over_)
-    if (file.after == opened_parts_) passed += (passed.empty() ? "" : ", ") + file.file.filename().string();
+  bool is_missing = !part_.after_gap;
+  for (const PassedOver& file : passed_over_) {
+    if (file.after != opened_parts_) continue;
+    passed += (passed.empty() ? "" : ", ") + file.file.filename().string();
+    is_missing = is_missing || !file.is_readable;
+  }
   if (!passed.empty()) sentence += " (passed over, as they are no readable parts of the recording: " + passed + ")";
   add_sentence(lost_, sentence);
+  if (is_missing) add_sentence(missing_, sentence);
   misses_some_ = true;
 }
 

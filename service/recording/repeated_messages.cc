@@ -16,24 +16,20 @@ constexpr core::TimeNs kMovingNs = 10'000'000'000;  // the history of TfBufferSe
 // A frame waits for less: so the image of a camera that has stopped does not keep all of another one's.
 constexpr core::TimeNs kImagesNs = 2'000'000'000;
 constexpr std::size_t kMostStatic = 1000;  // messages
-constexpr std::size_t kMostBytes = std::size_t{128} << 20;
 
-/// The same for messages of which the later one replaces all that the earlier one says: between which frames their
-/// transforms are. Of what is refused, even in part, its bytes.
+/// Between which frames its transforms are, the same for messages of which the later one replaces all that the earlier
+/// one says; "" where any of it is refused.
 std::string frames_of(const interfaces::ReceivedMessage& message) {
   const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr);
-  if (tf) {
-    const auto transforms = interfaces::to_transforms(*tf);
-    if (transforms && transforms->rejected.empty()) {
-      std::set<std::string> pairs;
-      for (const interfaces::FrameTransform& transform : transforms->accepted)
-        pairs.insert(transform.parent + '\n' + transform.child + '\n');
-      std::string frames = "frames ";
-      for (const std::string& pair : pairs) frames += pair;
-      return frames;
-    }
-  }
-  return "bytes " + std::string(message.cdr.begin(), message.cdr.end());
+  if (!tf) return "";
+  const auto transforms = interfaces::to_transforms(*tf);
+  if (!transforms || !transforms->rejected.empty()) return "";
+  std::set<std::string> pairs;
+  for (const interfaces::FrameTransform& transform : transforms->accepted)
+    pairs.insert(transform.parent + '\n' + transform.child + '\n');
+  std::string frames;
+  for (const std::string& pair : pairs) frames += pair;
+  return frames;
 }
 
 }  // namespace
@@ -63,33 +59,35 @@ void RepeatedMessages::note(const interfaces::ReceivedMessage& message, MessageI
     keep(moving_, message, index);
   } else if (message.type == "sensor_msgs/msg/CameraInfo" || message.topic == kSettingsTopic) {
     std::deque<Entry>& one = newest_[message.topic];
-    if (!one.empty()) drop_front(one);
     keep(one, message, index);
+    if (one.size() > 1) drop_front(one);
   } else if (message.type == "rosgraph_msgs/msg/Clock") {
     keep(clock_, message, index);
     if (!needs_images_ && clock_.size() > 1) drop_front(clock_);
   }
-  for (std::deque<Entry>* from : {&images_, &clock_, &moving_})
-    while (bytes_ > kMostBytes && from->size() > 1) drop_front(*from);
+  for (std::deque<Entry>* from : {&images_, &clock_, &moving_}) {
+    for (; bytes_ > kMostBytes && from->size() > 1; ++dropped_) drop_front(*from);
+  }
+  for (; bytes_ > kMostBytes && static_.size() > 1; ++dropped_) drop_static(0);
+}
+
+void RepeatedMessages::drop_static(std::size_t number) {
+  bytes_ -= static_[number].entry.first.cdr.size();
+  static_.erase(static_.begin() + static_cast<std::ptrdiff_t>(number));
 }
 
 void RepeatedMessages::note_static(const interfaces::ReceivedMessage& message, MessageIndex index) {
-  static_frames_.resize(static_.size());  // where there was no memory for the one before
   std::string frames = frames_of(message);
-  const auto first = std::find(static_frames_.begin(), static_frames_.end(), frames);
-  const auto newest = std::find(static_frames_.rbegin(), static_frames_.rend(), frames);
-  if (first != static_frames_.end() && std::next(newest).base() != first) {
-    const auto entry = static_.begin() + (std::next(newest).base() - static_frames_.begin());
-    bytes_ -= entry->first.cdr.size();
-    static_.erase(entry);
-    static_frames_.erase(std::next(newest).base());
+  std::vector<std::size_t> same;
+  for (std::size_t i = 0; i < static_.size(); ++i) {
+    const Static& other = static_[i];
+    if (other.frames == frames && (!frames.empty() || other.entry.first.cdr == message.cdr)) same.push_back(i);
   }
-  static_frames_.push_back(std::move(frames));
-  keep(static_, message, index);
-  if (static_.size() > kMostStatic) {
-    drop_front(static_);
-    static_frames_.pop_front();
-  }
+  static_.push_back({{message, index}, std::move(frames)});
+  bytes_ += message.cdr.size();
+  // The first stays, too.
+  if (same.size() > 1) drop_static(same.back());
+  for (; static_.size() > kMostStatic; ++dropped_) drop_static(0);
 }
 
 void RepeatedMessages::need_images_from(MessageIndex index) {
@@ -103,7 +101,8 @@ core::Status RepeatedMessages::each(
   std::vector<const Entry*> all;
   for (const auto& [topic, entries] : newest_)
     for (const Entry& entry : entries) all.push_back(&entry);
-  for (const std::deque<Entry>* entries : {&static_, &moving_, &images_, &clock_})
+  for (const Static& kept : static_) all.push_back(&kept.entry);
+  for (const std::deque<Entry>* entries : {&moving_, &images_, &clock_})
     for (const Entry& entry : *entries) all.push_back(&entry);
   std::sort(all.begin(), all.end(), [](const Entry* a, const Entry* b) { return a->second < b->second; });
   for (const Entry* entry : all) PRESCENE_RETURN_IF_ERROR(take(entry->first, entry->second));

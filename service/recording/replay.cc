@@ -32,17 +32,17 @@ core::Result<bool> has_step_records(const std::filesystem::path& path, bool salv
 }
 
 /// Whether there are step records that a replay follows.
-core::Result<bool> follows_step_records(const std::filesystem::path& path, const RecordingPart& part,
+core::Result<bool> follows_step_records(const std::filesystem::path& path, const RecordingReader& reader,
                                         const RecordingReadOptions& options) {
   // Only a file of ours has them; and a belief that begins later goes its own way.
   if (std::filesystem::is_directory(path) || path.extension() == ".db3" || options.from > 0.0) return false;
   PRESCENE_TRY(bool has_steps, has_step_records(path, options.salvage));
-  if (has_steps || !options.all_parts) return has_steps;
-  for (const std::filesystem::path& later : parts_after(path, part)) {
+  // The first file may be of a time when nothing was tracked yet.
+  for (const std::filesystem::path& later : reader.later_files()) {
+    if (has_steps) break;
     PRESCENE_TRY(has_steps, has_step_records(later, options.salvage));
-    if (has_steps) return true;
   }
-  return false;
+  return has_steps;
 }
 
 class Replay {
@@ -153,7 +153,7 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
                                              const core::ProgressSink& progress, const StepSink& on_step,
                                              const JsonSink& on_json) {
   PRESCENE_TRY(const auto reader, RecordingReader::open(path, options));
-  PRESCENE_TRY(const bool follow, follows_step_records(path, reader->info().part, options));
+  PRESCENE_TRY(const bool follow, follows_step_records(path, *reader, options));
   const double total = static_cast<double>(reader->message_count().value_or(0));
   Replay replay(tracker, on_step, follow);
   ReadAhead ahead(*reader, [&tracker](const auto& message) { return tracker.decode(message); });
@@ -183,6 +183,7 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
   ahead.stop();
   if (!replay.summary().cancelled) PRESCENE_RETURN_IF_ERROR(replay.finish());
   replay.summary().loss = reader->loss_text();
+  replay.summary().missing = reader->missing_text();
   replay.summary().unchecked = reader->unchecked_text();
   return replay.take_summary();
 }

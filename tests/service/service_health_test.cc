@@ -107,11 +107,17 @@ TEST(ServiceHealth, TellsOfEveryLossByItsPlace) {
   health.recording.tries = 31;
   health.recording.lost_messages = 777;
   health.recording.first_failure = "run.mcap: no space left";
+  health.recording.not_repeated = 41;
+  health.recording.unfinished = 43;
+  health.recording.last_unfinished = "out of memory";
   const auto status = to_diagnostic(health, {}, "here");
   const std::vector<interfaces::RosKeyValue> some = {{"recording interrupted", "2"},
                                                      {"first interruption", "run.mcap: no space left"},
                                                      {"tries to go on recording", "31"},
                                                      {"messages not recorded", "777"},
+                                                     {"messages not repeated", "41"},
+                                                     {"recording jobs unfinished", "43"},
+                                                     {"last unfinished recording job", "out of memory"},
                                                      {"recorded files", "0"},
                                                      {"dropped in the inbox", "15"},
                                                      {"dropped by topic", "/camera/depth 3, /tf 12"},

@@ -25,6 +25,10 @@ core::Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& p
 core::Result<std::filesystem::path> create_beside(const std::filesystem::path& path,
                                                   const std::filesystem::path& named = {});
 
+/// Creates an empty file of this name. False where there is something of that name already, be it a link that leads
+/// nowhere: it stays as it is. kUnavailable as write_file.
+core::Result<bool> create_new_file(const std::filesystem::path& path);
+
 /// Writes beside the target and renames at the end: the old content stays when anything fails. Makes no folders.
 /// Whatever keeps a file from being written is kUnavailable, with the path as it was given and the system's reason.
 core::Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
@@ -43,6 +47,10 @@ class OutputFile {
   /// Truncates an existing file. Errors speak of `named`, if any, in place of the path.
   static core::Result<OutputFile> create(const std::filesystem::path& path, const std::filesystem::path& named = {});
 
+  /// Says to other programs that it is being written, until it is closed or the program ends: is_in_use(). Does nothing
+  /// on file systems without locks.
+  void mark_in_use();
+
   bool is_open() const { return descriptor_ >= 0; }
   const std::filesystem::path& path() const { return path_; }
   /// All bytes or an error (kUnavailable, as of a full disk).
@@ -55,6 +63,9 @@ class OutputFile {
   std::filesystem::path path_, named_;
   int descriptor_ = -1;
 };
+
+/// Whether somebody writes a file that was marked so; also where that can't be known.
+bool is_in_use(const std::filesystem::path& path);
 
 /// A file that is read at any place; its size is the one at opening. Not thread-safe.
 class InputFile {

@@ -66,7 +66,8 @@ class McapWriter {
   /// How long ago the oldest of what was handed over and is not known to be on the disk was, s; 0 without
   /// sync_interval.
   double seconds_at_risk() const;
-  /// Writes the index, statistics and footer. Nothing can be written afterwards.
+  /// Writes the index, statistics and footer. Nothing can be written afterwards. Throws nothing: where memory ends, it
+  /// is kResourceExhausted, and the file ends as one that was cut.
   core::Status close();
 
  private:

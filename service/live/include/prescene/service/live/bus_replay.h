@@ -43,7 +43,8 @@ struct BusReplayResult {
     double seconds = 0.0;  ///< From question to answer.
   };
   std::vector<Answered> answers;
-  std::string loss;       ///< As ReplaySummary.
+  std::string loss;       ///< As ReplaySummary,
+  std::string missing;    ///< like this one.
   std::string unchecked;  ///< The same.
 };
 

@@ -30,6 +30,8 @@ struct RecordingPart {
   MessageIndex first_message = 0;  ///< The number of the first message of the robot that is new in it.
   core::TimeNs began_ns = 0;       ///< When it was begun, by the clock of its log times.
   bool after_gap = false;          ///< Something was not recorded between it and the one before.
+  /// The file name under which it was asked to keep only so much; "" = it stays (PartLimits::keep_bytes).
+  std::string bounded_as = "";
 };
 
 /// What a recording says about itself, in its metadata record "prescene", with a checksum: in a recording that was cut
@@ -51,6 +53,8 @@ std::filesystem::path unused_recording_path(const std::filesystem::path& path);
 
 /// The file of a recording's part: "run.mcap", "run_0001.mcap", ...
 std::filesystem::path part_path(const std::filesystem::path& first, std::uint64_t number);
+/// What a file says of itself; its series is "" where that is nothing. Errors of McapReader::open.
+core::Result<RecordingPart> part_of(const std::filesystem::path& file);
 /// A file beside a recording that is called as its parts are and does not say that it belongs to it.
 struct PassedOver {
   std::filesystem::path file;
@@ -192,6 +196,11 @@ class RecordingReader {
   /// What could not be read, and what could not be checked: a sentence each, empty = nothing. Complete at the end.
   std::string loss_text() const;
   std::string unchecked_text() const;
+  /// Of the loss, what is in files of the recording that are not there or can't be read. Not what its last file was cut
+  /// by, nor what was not recorded.
+  const std::string& missing_text() const { return missing_; }
+  /// The files after the one that is read, with all_parts.
+  const std::vector<std::filesystem::path>& later_files() const { return parts_; }
   /// Nothing where it is not known: of several files before the last is reached.
   std::optional<std::uint64_t> message_count() const {
     return parts_.empty() ? reader_->message_count() : std::nullopt;
@@ -220,7 +229,8 @@ class RecordingReader {
   RecordingPart part_;                 // of the file that is read
   std::shared_ptr<PartStart> starts_;  // of the next entry that is new
   std::string lost_, unchecked_;       // of the files before
-  bool misses_some_ = false;           // since the last belief that was read, or the beginning
+  std::string missing_;
+  bool misses_some_ = false;  // since the last belief that was read, or the beginning
   std::vector<PassedOver> passed_over_;
   std::size_t opened_parts_ = 0;
   std::optional<core::TimeNs> first_ns_;  // when the first message came

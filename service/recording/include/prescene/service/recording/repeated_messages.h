@@ -16,9 +16,12 @@
 
 namespace prescene::service {
 
-/// Not thread-safe. Takes at most 128 MiB: of what is too much, the oldest goes.
+/// Not thread-safe. Where a call throws (there is no memory), what was noted before stays.
 class RepeatedMessages {
  public:
+  /// Of messages that are kept: of what is too much, the oldest goes.
+  static constexpr std::size_t kMostBytes = std::size_t{128} << 20;
+
   /// `tf_static`: the topic of the static transforms.
   explicit RepeatedMessages(std::string tf_static = InputTopics{}.tf_static) : tf_static_(std::move(tf_static)) {}
   /// A message of the robot under its number, which ascends.
@@ -31,23 +34,29 @@ class RepeatedMessages {
   core::Status each(
       const std::function<core::Status(const interfaces::ReceivedMessage& message, MessageIndex index)>& take) const;
   std::size_t bytes() const { return bytes_; }
+  /// Messages that went for want of room, since the start.
+  std::uint64_t dropped() const { return dropped_; }
 
  private:
   using Entry = std::pair<interfaces::ReceivedMessage, MessageIndex>;
+  struct Static {
+    Entry entry;
+    std::string frames;  // between which its transforms are; "" = it is refused, at least in part
+  };
   void keep(std::deque<Entry>& in, const interfaces::ReceivedMessage& message, MessageIndex index);
   void drop_front(std::deque<Entry>& from);
-
+  void drop_static(std::size_t number);
   void note_static(const interfaces::ReceivedMessage& message, MessageIndex index);
 
   std::string tf_static_;
   std::map<std::string, std::deque<Entry>> newest_;  // by topic: camera infos, settings
-  std::deque<Entry> static_;                         // transforms
-  std::deque<std::string> static_frames_;            // of each of static_
+  std::deque<Static> static_;                        // transforms
   std::deque<Entry> moving_;                         // transforms and joint states
   std::deque<Entry> images_;
   std::deque<Entry> clock_;
   bool needs_images_ = false;
   std::size_t bytes_ = 0;
+  std::uint64_t dropped_ = 0;
 };
 
 }  // namespace prescene::service

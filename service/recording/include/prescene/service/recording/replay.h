@@ -41,6 +41,7 @@ struct ReplaySummary {
   std::optional<std::uint64_t> first_different_step;
   bool cancelled = false;  ///< Stopped on request before the end.
   std::string loss;        ///< What of the file could not be read; empty = all was read.
+  std::string missing;     ///< As RecordingReader::missing_text().
   std::string unchecked;   ///< What of it has no checksum; empty = all was checked.
   /// What was doubtful or second best in the steps (a distorting lens, ...), with the number of the steps that it was
   /// so in, in the order of the first ones. Of more than a hundred, the first.

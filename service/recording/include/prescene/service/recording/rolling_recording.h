@@ -38,13 +38,17 @@
 
 namespace prescene::service {
 
+class RecordingRoom;
+struct RemovedFile;
+
 /// When a new file begins; 0 = not by this. It always does before a reader's limits are reached
 /// (interfaces::McapReader): at half of them.
 struct PartLimits {
   double seconds = 0.0;
   /// Of what is new in the file: without the attached files, what is repeated, and the belief.
   std::uint64_t bytes = 0;
-  /// The oldest files of this recording are removed when all of them take more than this; the newest two never are.
+  /// The oldest files are removed when all take more than this: those of this recording, but for the newest two, and
+  /// before them those of earlier ones that were made with such a bound under the same name (RollingOptions::asked).
   std::uint64_t keep_bytes = 0;
 };
 
@@ -57,13 +61,15 @@ struct RollingOptions {
   std::uint64_t room = std::uint64_t{64} << 20;
   /// The topic of the static transforms.
   std::string tf_static = InputTopics{}.tf_static;
+  /// The name that was asked for, where unused_recording_path() gave another; "" = it did not.
+  std::filesystem::path asked = {};
 };
 
 /// How a recording is.
 struct RollingState {
   std::filesystem::path file;       ///< That is written, or was last.
   std::uint64_t files = 1;          ///< That were begun.
-  std::uint64_t removed = 0;        ///< Of them, for want of room (PartLimits::keep_bytes).
+  std::uint64_t removed = 0;        ///< Files that were removed (PartLimits::keep_bytes).
   std::uint64_t interruptions = 0;  ///< Times that writing failed.
   std::uint64_t tries = 0;          ///< To begin a new file after that.
   std::uint64_t lost_messages = 0;  ///< Of the robot, in the pauses.
@@ -71,10 +77,15 @@ struct RollingState {
   std::string first_failure;        ///< Why it was not for the first time; stays.
   std::string without_belief;       ///< Why the file holds no belief to go on from; "" = it does, or needs none.
   std::string not_removed;          ///< Why the last file that was to go could not be removed; "" = it could.
+  /// Messages that the next file should have repeated and does not: there were too many (RepeatedMessages), or there
+  /// was no memory for them. Frames at its beginning may lack them.
+  std::uint64_t not_repeated = 0;
+  std::uint64_t unfinished = 0;  ///< Jobs of the recording's thread that ended in an exception.
+  std::string last_unfinished;   ///< Why the last of them did.
 };
 
-/// Not thread-safe: owned by the thread that steps the belief. Where a library throws (there is no memory), what was to
-/// be written is not in the recording.
+/// Not thread-safe: owned by the thread that steps the belief. Where a call throws (there is no memory), what was to be
+/// written is not in the recording, which goes on, in a new file if need be. Its own thread throws nothing.
 class RollingRecording {
  public:
   /// Begins the first file; errors of RecordingWriter::create. `info.part` is not looked at.
@@ -129,6 +140,18 @@ class RollingRecording {
   /// Hands over to the thread.
   void work(std::function<void()> job);
   void run();
+  /// Closes it on the thread, or here where there is no memory to hand it over.
+  void close_later(std::unique_ptr<RecordingWriter> writer, bool reports);
+  /// Counts that nothing is written from now on.
+  void interrupt(const core::Status& why);
+  /// Of the file of that number, on the thread.
+  core::Result<Ready> made_ready(std::uint64_t number);
+  void begin_file(Ready ready);
+  /// Of a file that could not be begun: removes it.
+  void put_aside(Ready ready, const core::Status& why);
+  void note_first_failure(const core::Status& why);
+  void take_snapshot();
+  void note(const interfaces::ReceivedMessage& message, MessageIndex index);
 
   std::filesystem::path first_;
   RecordingInfo info_;
@@ -146,6 +169,9 @@ class RollingRecording {
   std::uint64_t next_number_ = 1;  // that no file was made with
   bool is_making_ready_ = false, is_asked_ = false, has_gap_ = false;
   std::deque<std::filesystem::path> kept_;  // this recording's files
+  std::unique_ptr<RecordingRoom> room_;     // used on the thread; null where all is kept
+  std::uint64_t not_noted_ = 0;             // messages that there was no memory to repeat
+  bool told_not_repeated_ = false;          // of this file
 
   std::mutex mutex_;  // guards all below
   std::condition_variable changed_;
@@ -153,7 +179,9 @@ class RollingRecording {
   std::optional<core::Result<Ready>> ready_;
   std::optional<std::pair<std::uint64_t, core::Result<std::string>>> snapshot_;  // of the file of that number
   std::vector<core::Status> closed_;                                             // failures
-  std::vector<std::pair<std::filesystem::path, std::string>> removed_;           // with why not; "" = it is
+  std::uint64_t unfinished_ = 0;
+  core::Status last_unfinished_;
+  std::vector<RemovedFile> removed_;
   bool ends_ = false;
   std::thread thread_;  // last: it uses all above
 };
