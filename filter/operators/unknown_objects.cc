@@ -89,21 +89,10 @@ std::optional<double> support_below(const SupportSurfaces& supports, const Vecto
   return below;
 }
 
-belief::ObjectModel model_about(const SeenShape& shape, bool round) {
-  belief::ObjectModel model;
+UnknownShape shape_about(const SeenShape& shape, bool round) {
   const Vector3d& s = shape.size;
-  const double radius = 0.25 * (s.x() + s.y());
-  if (round) {
-    model.collision.push_back(belief::PrimitiveShape{geometry::Cylinder{radius, s.z()}, Pose::identity()});
-    model.symmetry = geometry::SymmetryGroup::continuous(Vector3d::UnitZ(), true);
-  } else {
-    model.collision.push_back(belief::PrimitiveShape{geometry::BoxShape{s}, Pose::identity()});
-    model.symmetry = geometry::SymmetryGroup::cuboid();
-  }
-  const double volume = round ? std::numbers::pi * radius * radius * s.z() : s.prod();
-  model.mass = belief::UniformScalar{kLeastDensity * volume, kMostDensity * volume};
-  model.contact.friction = belief::UniformScalar{kLeastFriction, kMostFriction};
-  return model;
+  if (round) return geometry::Cylinder{0.25 * (s.x() + s.y()), s.z()};
+  return geometry::BoxShape{s};
 }
 
 /// Share of the points that lie in or about the bounding box of something known. `scene`: that of the belief to be.
@@ -138,7 +127,7 @@ std::optional<NewThing> explained_by(const SeenShape& shape, const rendering::Fr
                                      const core::RandomStream& stream) {
   std::optional<NewThing> best;
   for (const bool round : {false, true}) {
-    auto model = belief::with_derived_properties(model_about(shape, round));
+    auto model = unknown_object_model(shape_about(shape, round));
     if (!model.ok()) continue;
     const SearchTarget target = target_of(*model, frame, tools);
     const Pose starts[] = {frame.X_CW * shape.X_WO};
@@ -153,6 +142,24 @@ std::optional<NewThing> explained_by(const SeenShape& shape, const rendering::Fr
 }  // namespace
 
 bool is_unknown_object(const std::string& name) { return name.starts_with(kUnknownObject); }
+
+core::Result<belief::ObjectModel> unknown_object_model(const UnknownShape& shape) {
+  belief::ObjectModel model;
+  double volume = 0.0;
+  if (const auto* cylinder = std::get_if<geometry::Cylinder>(&shape)) {
+    model.collision.push_back(belief::PrimitiveShape{*cylinder, Pose::identity()});
+    model.symmetry = geometry::SymmetryGroup::continuous(Vector3d::UnitZ(), true);
+    volume = std::numbers::pi * cylinder->radius * cylinder->radius * cylinder->length;
+  } else {
+    const auto& box = std::get<geometry::BoxShape>(shape);
+    model.collision.push_back(belief::PrimitiveShape{box, Pose::identity()});
+    model.symmetry = geometry::SymmetryGroup::cuboid();
+    volume = box.size.prod();
+  }
+  model.mass = belief::UniformScalar{kLeastDensity * volume, kMostDensity * volume};
+  model.contact.friction = belief::UniformScalar{kLeastFriction, kMostFriction};
+  return belief::with_derived_properties(std::move(model));
+}
 
 std::optional<SeenShape> box_about(std::span<const Vector3d> points_W, const Vector3d& up_W, double base) {
   if (points_W.size() < kFewestPoints) return std::nullopt;

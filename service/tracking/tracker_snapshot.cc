@@ -9,54 +9,12 @@
 #include "prescene/belief/json.h"
 #include "prescene/core/hash.h"
 #include "prescene/service/outside_json.h"
+#include "snapshot_scene.h"
 
 namespace prescene::service {
 namespace {
 
 using nlohmann::ordered_json;
-
-/// What a belief's scene has of the tracker's own: names, with what holds each object.
-ordered_json scene_json(const belief::Scene& scene) {
-  ordered_json objects = ordered_json::array(), joints = ordered_json::array();
-  for (const belief::SceneObject& object : scene.objects) {
-    ordered_json& row = objects.emplace_back(ordered_json{{"name", object.name}});
-    if (object.held_by) row["held_by"] = *object.held_by;
-  }
-  for (const belief::Joint& joint : scene.joints) joints.push_back(joint.name);
-  return {{"objects", std::move(objects)}, {"joints", std::move(joints)}};
-}
-
-/// Null where it names something that `scene` does not have.
-std::shared_ptr<const belief::Scene> scene_from(const ordered_json& json,
-                                                const std::shared_ptr<const belief::Scene>& scene) {
-  if (!json.is_object() || !json.contains("objects") || !json["objects"].is_array() || !json.contains("joints") ||
-      !json["joints"].is_array())
-    return nullptr;
-  auto read = std::make_shared<belief::Scene>(*scene);
-  read->objects.clear();
-  read->joints.clear();
-  for (const ordered_json& row : json["objects"]) {
-    if (!row.is_object() || !row.contains("name") || !row["name"].is_string()) return nullptr;
-    const auto number = belief::find_object(*scene, row["name"].get<std::string>());
-    if (!number) return nullptr;
-    belief::SceneObject object = scene->objects[static_cast<std::size_t>(*number)];
-    object.held_by.reset();
-    if (row.contains("held_by")) {
-      if (!row["held_by"].is_string()) return nullptr;
-      object.held_by = row["held_by"].get<std::string>();
-      if (!belief::find_robot_body(*scene, *object.held_by)) return nullptr;
-    }
-    read->objects.push_back(std::move(object));
-  }
-  for (const ordered_json& name : json["joints"]) {
-    if (!name.is_string()) return nullptr;
-    const auto number = belief::find_joint(*scene, name.get<std::string>());
-    if (!number) return nullptr;
-    read->joints.push_back(scene->joints[static_cast<std::size_t>(*number)]);
-  }
-  if (*read == *scene) return scene;
-  return read;
-}
 
 /// Whether all that the filter finds by its place in one of them is at that place in the other.
 bool are_of_each_other(const belief::Belief& belief, const belief::Scene& scene) {
@@ -82,13 +40,13 @@ core::Result<std::string> snapshot_text(const TrackerSnapshot& snapshot,
     taken.push_back({{"camera", frame.camera}, {"depth", frame.depth}, {"at_ns", frame.at_ns}});
   const std::string hash = core::hash_text(belief::content_hash(*snapshot.belief));
   std::string text = belief::json_text({{"belief_hash", hash},
-                                        {"scene", scene_json(*snapshot.belief->scene)},
+                                        {"scene", scene_json(*snapshot.belief->scene, *scene)},
                                         {"belief", belief::to_json(*snapshot.belief)},
                                         {"controls", snapshot.controls.to_json()},
                                         {"taken", std::move(taken)}});
   const auto again = snapshot_from_text(text, scene);
   if (!again || !(*again->belief->scene == *snapshot.belief->scene))
-    return core::unsupported("the belief holds what was found and its scene does not name" +
+    return core::unsupported("the belief's scene differs from the given one in what can't be written" +
                              (again ? std::string() : " (" + again.status().message() + ")"));
   return text;
 }
@@ -101,7 +59,7 @@ core::Result<TrackerSnapshot> snapshot_from_text(const std::string& text,
   for (const char* key : {"belief_hash", "scene", "belief", "controls", "taken"})
     if (!json.contains(key)) return bad("no '" + std::string(key) + "'");
   const auto of_belief = scene_from(json["scene"], scene);
-  if (!of_belief) return bad("it names what the scene does not have");
+  if (!of_belief) return bad("its scene is none that came of the given one");
   PRESCENE_TRY(belief::Belief belief, belief::belief_from_json(json["belief"], of_belief));
   if (!json["belief_hash"].is_string() ||
       json["belief_hash"].get<std::string>() != core::hash_text(belief::content_hash(belief)))

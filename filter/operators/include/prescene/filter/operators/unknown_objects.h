@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <variant>
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
@@ -20,6 +21,12 @@ namespace prescene::filter {
 inline constexpr const char* kUnknownObject = "unknown_";
 /// Whether an object of this name was found, and not given by the scene.
 bool is_unknown_object(const std::string& name);
+
+/// What a model of its own is of: a box, or an upright cylinder, about its origin.
+using UnknownShape = std::variant<geometry::BoxShape, geometry::Cylinder>;
+/// The model of such an object, without a name: all else follows from its shape. Errors of
+/// belief::with_derived_properties.
+core::Result<belief::ObjectModel> unknown_object_model(const UnknownShape& shape);
 
 /// A shape about points of which only what faces the camera was seen: upright on a support, from its height up to the
 /// highest points.

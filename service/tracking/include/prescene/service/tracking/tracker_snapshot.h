@@ -31,8 +31,8 @@ struct TrackerSnapshot {
 };
 
 /// As JSON, some 3 kB a particle. `scene` is the tracker's own, from which that of the belief may differ in what is
-/// held, and in objects and joints that are gone. kUnsupported where it differs in anything else (an object or a
-/// support that was found): the text would not bring the same belief back. Takes the time of writing and reading the
+/// held, in objects and joints that are gone, and in supports and objects that were found. kUnsupported where it
+/// differs in anything else: the text would not bring the same belief back. Takes the time of writing and reading the
 /// belief, some 10 ms a megabyte.
 core::Result<std::string> snapshot_text(const TrackerSnapshot& snapshot,
                                         const std::shared_ptr<const belief::Scene>& scene);
