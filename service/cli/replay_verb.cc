@@ -88,6 +88,12 @@ void warn_of_unchecked(const ReplayOptions& options, const std::string& unchecke
   if (!unchecked.empty()) core::log(context.log(), core::LogLevel::kInfo, options.input + ": " + unchecked);
 }
 
+/// kDataLoss where files of the recording are not there; --salvage takes what is.
+core::Status check_files(const ReplayOptions& options, const std::string& missing) {
+  if (missing.empty() || options.read.salvage) return core::ok_status();
+  return core::data_loss(options.input + ": " + missing + "; --salvage takes what is there");
+}
+
 /// Whether every question has its answer.
 core::Status check_answers(const std::vector<BusReplayResult::Answered>& answers) {
   for (const BusReplayResult::Answered& answered : answers) {
@@ -174,13 +180,15 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
                  {"answers", answers},
                  {"foreseen", foreseen_json(foreseen)},
                  {"loss", result.loss},
+                 {"missing", result.missing},
                  {"damaged_records", damaged.count()},
                  {"unchecked", result.unchecked}},
                 std::to_string(result.messages) + " messages played, " + std::to_string(result.beliefs.size()) +
                     " beliefs came back\n" + answers_text(result.answers) + foreseen_text_of(foreseen) + states.text() +
                     tracking_text(rows));
   if (context.cancellation().requested()) return core::cancelled("stopped on request; what was done is printed");
-  return check_answers(result.answers);
+  PRESCENE_RETURN_IF_ERROR(check_answers(result.answers));
+  return check_files(options, result.missing);
 }
 
 /// Writes what was learned where it is to be kept.
@@ -341,6 +349,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
        {"different_explanations", explained.different()},
        {"began_anew", summary->began_anew},
        {"loss", summary->loss},
+       {"missing", summary->missing},
        {"damaged_records", damaged.count()},
        {"unchecked", summary->unchecked},
        {"learned", options.learned},
@@ -370,6 +379,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   }
   if (explained.different() > 0)
     return core::unavailable(explained.first_difference() + ": another version, machine or setting?");
+  PRESCENE_RETURN_IF_ERROR(check_files(options, summary->missing));
   return check_steps(*summary, first_topics(settings, *input.scene())).at(options.input + window_text(options.read));
 }
 

@@ -328,11 +328,10 @@ core::Status check_recording(const std::string& option, const std::string& outpu
   std::error_code none;
   const std::filesystem::path place = std::filesystem::absolute(output, none).lexically_normal();
   const std::filesystem::path folder = std::filesystem::weakly_canonical(place.parent_path(), none);
-  const bool there = std::filesystem::exists(output, none);
+  const bool is_other = std::filesystem::exists(output, none) && !std::filesystem::is_regular_file(output, none);
   // Redirected to a file, /dev/stdout looks like one, but belongs to who redirected it.
-  if ((there && !std::filesystem::is_regular_file(output, none) && !std::filesystem::is_directory(output, none)) ||
-      folder == "/dev" || folder == std::filesystem::weakly_canonical("/dev/fd", none))
-    return core::unavailable(option + " " + output + ": can't be written: a recording is a file of its own; name one");
+  if (is_other || folder == "/dev" || folder == std::filesystem::weakly_canonical("/dev/fd", none))
+    return core::invalid_input(option + " " + output + ": is no file: a recording is a file of its own; name one");
   return check_output(option, output, inputs);
 }
 

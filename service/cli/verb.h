@@ -167,7 +167,7 @@ core::Status check_output(const std::string& option, const std::string& output, 
 /// kInvalidInput if the name of a picture that is written as PNG ends like that of another kind of file (".jpg").
 core::Status check_png(const std::string& option, const std::string& output);
 
-/// check_output for a recording, which is never a device or pipe.
+/// check_output for a recording; kInvalidInput for what is there and no file, as a device, a pipe or a folder.
 core::Status check_recording(const std::string& option, const std::string& output,
                              const std::vector<std::string>& inputs);
 
