@@ -43,8 +43,13 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
   WeightReport& report = step.reports[object];
   std::vector<double> before;
   for (const Particle& particle : seen.particles) before.push_back(particle.log_weight);
+  const std::shared_ptr<const RestingShape> shape = tools_.meshes->resting_shape(*target.mesh);
+  const bool falls = belief.scene->gravity_W.norm() > 0.0;
   WeightContext context{.supports = frame.surfaces.get(),
                         .solids = &frame.solids,
+                        .shape = falls ? shape.get() : nullptr,
+                        .up_W = frame.up_W,
+                        .support_depth = &frame.supports,
                         .was_unseen = was_unseen_by(seen, step.observation.camera),
                         .depth = step.observation.frame.depth.get(),
                         .camera = step.observation.frame.camera};

@@ -16,6 +16,8 @@ constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10
 constexpr double kFirstGate = 0.03;          // m; residuals beyond about half of it lose their weight ...
 constexpr double kSharedShift = 0.003;       // m; an outline serves for poses so near to where it was taken ...
 constexpr double kSharedTurn = 0.03;         // rad
+constexpr double kSupportAround = 2.5;       // radii of the object; so far around it its support's height is measured
+constexpr double kContactHeight = 0.001;     // m, error of a support's height where no frame can tell
 constexpr double kFullOverlap = 0.25;        // share of a hidden pose's overlap with a support from which ...
 constexpr double kLogInSupport = -12.0;      // nats; ... it costs this; less in proportion
 
@@ -161,6 +163,18 @@ FrameEquations ParticleUpdate::equations_at(const Pose& X_WO, double gate, const
   equations.gradient.tail<3>() = X_CW_.rotation.conjugate() * g.tail<3>();
   equations.evidence = residuals.evidence;
   return equations;
+}
+
+PoseEquations ParticleUpdate::standing_at(const Pose& X_WO, const FrameEquations& seen) const {
+  if (context_.shape == nullptr || context_.supports == nullptr) return {};
+  const auto radius = static_cast<double>(target_.mesh->radius);
+  const auto height_at = [&](const Vector3d& p_WB, const Vector3d& normal_W) {
+    if (context_.support_depth == nullptr) return SupportHeight{0.0, kContactHeight};
+    return support_height(terms_, *context_.support_depth, X_CW_, p_WB, normal_W, radius, kSupportAround * radius);
+  };
+  return standing_equations(*context_.shape, *target_.mesh, *context_.supports, context_.up_W, X_WO, height_at,
+                            {seen.information, seen.gradient}, kCommonError)
+      .value_or(PoseEquations{});
 }
 
 const Outline* ParticleUpdate::outline_near(const Pose& X_WO, std::optional<Outline>& own) const {

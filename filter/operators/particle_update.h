@@ -5,11 +5,15 @@
 
 #include <optional>
 
+#include "prescene/filter/operators/standing.h"
 #include "prescene/filter/operators/weight.h"
 #include "prescene/filter/proposals/outline.h"
 
 namespace prescene::filter {
 
+// Share of the variance of what a frame says of a pose: errors that stay from frame to frame (calibration, a pattern in
+// the depth), which do not average out over what lies still.
+inline constexpr double kCommonError = 0.5;
 inline constexpr double kLastGate = 0.012;       // m; residuals beyond about half of it lose their weight at the end
 inline constexpr double kMostStartShift = 0.03;  // m; a start is never further off, however wide the prediction is, ...
 inline constexpr double kMostStartTurn = 0.35;   // rad; ... nor turned further
@@ -80,6 +84,8 @@ class ParticleUpdate {
   Mode climb(const Pose& X_WO_predicted, const Gaussian& predicted, const Vector6d& start) const;
   /// Depth residuals up to the gate, tempered, and the outline if there is one.
   FrameEquations equations_at(const Pose& X_WO, double gate, const Outline* outline, bool with_evidence = false) const;
+  /// What follows from resting at this pose, where the frame says that of it (standing.h); zero where nothing does.
+  PoseEquations standing_at(const Pose& X_WO, const FrameEquations& seen) const;
   /// The shared outline where it serves, else one taken here; null where poses follow residuals alone.
   const Outline* outline_near(const Pose& X_WO, std::optional<Outline>& own) const;
   rendering::PoseEvidence evidence(const Pose& X_WO) const;

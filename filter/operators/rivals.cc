@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "prescene/filter/operators/standing.h"
 #include "rival_search.h"
 #include "turns.h"
 
@@ -86,6 +87,12 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
              (particle.X_WO * target.centre() - rival.X_WO * target.centre()).norm() < kHeldShift;
     });
   });
+  if (best.mode == belief::MotionMode::kResting) {
+    const std::shared_ptr<const RestingShape> shape = tools.meshes->resting_shape(*target.mesh);
+    for (Rival& rival : rivals)
+      rival.log_odds += log_standing_odds(*shape, *frame.surfaces, frame.up_W, *target.mesh, rival.X_WO, best.X_WO);
+    std::erase_if(rivals, [&](const Rival& rival) { return rival.log_odds < least; });
+  }
   if (rivals.empty()) return 0;
   std::vector<Particle>& particles = object.particles;
   double log_best = -std::numeric_limits<double>::infinity();

@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/geometry/dense_solvers.h"
+
 namespace prescene::filter {
 namespace {
 
 using belief::Particle;
 
-// Share of the variance of what a frame says of a pose: errors that stay from frame to frame (calibration, a pattern in
-// the depth), which do not average out over what lies still.
-constexpr double kCommonError = 0.5;
 constexpr double kAlikeShift = 0.003;     // m; resting particles so near to each other are compared with a frame ...
 constexpr double kAlikeTurn = 0.03;       // rad; ... at one pose
 constexpr double kComparedShift = 0.008;  // m; poses so near to where the frame's equations were taken ...
@@ -19,7 +18,31 @@ constexpr double kComparedTurn = 0.12;    // rad; ... are compared by these
 constexpr double kQuietShift = 0.003;     // m; where the frame wants a particle no further from there than this ...
 constexpr double kQuietTurn = 0.05;       // rad; ..., the equations are all there is to know, ...
 constexpr double kQuietHits = 0.8;        // share; ... if so many of the visible pixels match
+constexpr double kRidge = 1e-9;           // of the information, so that it can be inverted
 constexpr double kOpenGain = 0.6;         // above this the frame decides, and one step may not reach its maximum
+
+StillUpdate update_by(const PoseEquations& equations, const Pose& X_WO, const Pose& X_WO_before,
+                      const Matrix6d& covariance) {
+  const Vector6d since = geometry::box_minus(X_WO, X_WO_before);
+  return still_update(covariance, equations.information, equations.gradient + equations.information * since,
+                      kCommonError);
+}
+
+/// nats by which the frame's log likelihood at a pose is below its maximum.
+double below_peak_at(const FrameLikelihood& likelihood, const Pose& X_WO) {
+  Matrix6d ridged = likelihood.frame.information;
+  ridged.diagonal().array() += kRidge * (1.0 + ridged.trace());
+  const Vector6d slope =
+      likelihood.frame.gradient - likelihood.frame.information * geometry::box_minus(X_WO, likelihood.X_WO);
+  return 0.5 * slope.dot(geometry::Cholesky6(ridged).solve(slope));
+}
+
+/// Takes down what the frame says of the likelihood's pose.
+void look_at(const ParticleUpdate& frame, const FrameEquations& equations, FrameLikelihood& likelihood) {
+  const PoseEquations stands = frame.standing_at(likelihood.X_WO, equations);
+  likelihood.frame = {equations.information, equations.gradient};
+  likelihood.resting = {equations.information + stands.information, equations.gradient + stands.gradient};
+}
 
 }  // namespace
 
@@ -28,21 +51,24 @@ bool FrameLikelihood::covers(const Pose& other_X_WO) const {
 }
 
 StillUpdate FrameLikelihood::update(const Pose& X_WO_before, const Matrix6d& covariance) const {
-  const Vector6d since = geometry::box_minus(X_WO, X_WO_before);
-  return still_update(covariance, information, gradient + information * since, kCommonError);
+  return update_by(resting, X_WO, X_WO_before, covariance);
+}
+
+StillUpdate FrameLikelihood::update_by_frame(const Pose& X_WO_before, const Matrix6d& covariance) const {
+  return update_by(frame, X_WO, X_WO_before, covariance);
 }
 
 bool update_quietly(const FrameLikelihood& near, Particle& particle) {
   if (near.report.evidence.hit_share() < kQuietHits || !near.covers(particle.X_WO)) return false;
   const Gaussian predicted = gaussian(particle.covariance.topLeftCorner<6, 6>());
-  const StillUpdate update = near.update(particle.X_WO, predicted.covariance);
+  const StillUpdate update = near.update_by_frame(particle.X_WO, predicted.covariance);
   Mode mode;
   mode.shift = update.shift;
   mode.X_WO = geometry::box_plus(particle.X_WO, update.shift);
   mode.covariance = update.covariance;
   if (!is_near(geometry::box_minus(mode.X_WO, near.X_WO), kQuietShift, kQuietTurn)) return false;
   move_to(mode, predicted, particle);
-  particle.log_weight += near.log_evidence(update);
+  particle.log_weight += near.log_frame_evidence(update);
   return true;
 }
 
@@ -56,15 +82,16 @@ std::optional<FrameLikelihood> update_still(const ParticleUpdate& frame, double 
   const Outline* outline = frame.outline_near(first.X_WO, own_outline);
   FrameEquations equations = frame.equations_at(first.X_WO, kLastGate, outline, true);
   if (shown_share(equations.evidence) < options.hidden_share) return std::nullopt;
-  FrameLikelihood likelihood{first.X_WO, equations.information, equations.gradient};
+  FrameLikelihood likelihood;
+  likelihood.X_WO = first.X_WO;
+  look_at(frame, equations, likelihood);
   StillUpdate update = likelihood.update(first.X_WO, predicted.covariance);
   if (update.largest_gain > kOpenGain) {
     for (int step = 0; step < options.steps && update.shift.allFinite(); ++step) {
       const double t = options.steps > 1 ? static_cast<double>(step) / (options.steps - 1) : 1.0;
       if (step > 0) likelihood.X_WO = geometry::box_plus(first.X_WO, update.shift);
       equations = frame.equations_at(likelihood.X_WO, gate_at(t), outline);
-      likelihood.information = equations.information;
-      likelihood.gradient = equations.gradient;
+      look_at(frame, equations, likelihood);
       update = likelihood.update(first.X_WO, predicted.covariance);
       update.shift *= std::min(limited(update.shift.head<3>().norm(), kMostStartTurn),
                                limited(update.shift.tail<3>().norm(), kMostStartShift));
@@ -79,8 +106,9 @@ std::optional<FrameLikelihood> update_still(const ParticleUpdate& frame, double 
   report.evidence = frame.evidence(X_WO_after);
   report.outline = frame.outline(X_WO_after);
   likelihood.report = report;
-  likelihood.log_peak =
-      frame.weight_share() * worth(report.evidence.log_ratio, report.outline, options) + update.below_peak;
+  const double log_here = frame.weight_share() * worth(report.evidence.log_ratio, report.outline, options);
+  likelihood.log_peak = log_here + update.below_peak;
+  likelihood.log_frame_peak = log_here + below_peak_at(likelihood, X_WO_after);
   const FrameLikelihood& weighing =
       near != nullptr && near->covers(X_WO_after) && near->covers(first.X_WO) ? *near : likelihood;
   for (const std::size_t i : members) {

@@ -16,16 +16,19 @@ namespace prescene::filter {
 /// The pixels of the coarse image that poses happen to cover differ more than the poses; this does not.
 struct FrameLikelihood {
   Pose X_WO;
-  Matrix6d information;
-  Vector6d gradient;
-  double log_peak = 0.0;       ///< nats, at its maximum.
-  ParticleWeight report = {};  ///< Where the resting object is after it.
+  PoseEquations frame;          ///< The frame's alone: of what moves, it is all.
+  PoseEquations resting;        ///< The same with what follows from resting there.
+  double log_peak = 0.0;        ///< nats, at the maximum of `resting` ...
+  double log_frame_peak = 0.0;  ///< ... and of `frame`.
+  ParticleWeight report = {};   ///< Where the resting object is after it.
 
   bool covers(const Pose& other_X_WO) const;
-  /// nats, of what follows for a prediction.
+  /// nats, of what follows for a prediction of what rests, or of what moves.
   double log_evidence(const StillUpdate& update) const { return log_peak + update.log_evidence; }
+  double log_frame_evidence(const StillUpdate& update) const { return log_frame_peak + update.log_evidence; }
   /// For a prediction about `X_WO_before`.
   StillUpdate update(const Pose& X_WO_before, const Matrix6d& covariance) const;
+  StillUpdate update_by_frame(const Pose& X_WO_before, const Matrix6d& covariance) const;
 };
 
 /// A particle for which the frame has nothing new: by what is known of the frame already. False, and nothing is done,

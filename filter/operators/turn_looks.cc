@@ -11,6 +11,7 @@
 #include "motion_following.h"
 #include "prescene/belief/distribution.h"
 #include "prescene/filter/operators/rivals.h"
+#include "prescene/filter/operators/standing.h"
 #include "rival_search.h"
 #include "turns.h"
 
@@ -39,14 +40,15 @@ constexpr double kLeastTurnDeviation = 0.0175;  // rad, of a prior: scenes are n
 constexpr double kLeastLogWeight = -700.0;      // of a turn whose particles have none
 constexpr double kNoEvidence = -std::numeric_limits<double>::infinity();
 
-/// A pose, what the fine image says of it (tempered), and what the scene says of its turn; nats.
+/// A pose, what the fine image says of it (tempered), and what else is known of its turn; nats.
 struct TurnFit {
   Pose X_WO;
   rendering::PoseEvidence evidence;
   double log_frame = kNoEvidence;
   double log_prior = 0.0;
+  double log_stands = 0.0;  ///< What physics says of it, against the likeliest particle.
 
-  double log(int cameras) const { return cameras * log_frame + log_prior; }
+  double log(int cameras) const { return cameras * log_frame + log_prior + log_stands; }
 };
 
 struct TurnFits {
@@ -82,8 +84,8 @@ void climb_by_evidence(const TurnLook& look, RivalSearch& search, std::span<Pose
 }
 
 TurnFits fits_in(const TurnLook& look, RivalSearch& coarse, RivalSearch& fine, const SymmetryGroup& symmetry,
-                 const std::vector<Particle>& particles, const std::vector<Turn>& turns,
-                 const WeightOptions& weighting) {
+                 const std::vector<Particle>& particles, const std::vector<Turn>& turns, const WeightOptions& weighting,
+                 const FilterTools& tools) {
   const std::vector<Pose> turned =
       turned_poses(particles[turns.front().leader].X_WO, look.target, symmetry, look.frame);
   std::vector<Pose> tried = turned, near, fitted, best, X_WO;
@@ -101,11 +103,16 @@ TurnFits fits_in(const TurnLook& look, RivalSearch& coarse, RivalSearch& fine, c
   X_WO.insert(X_WO.end(), best.begin(), best.end());
 
   const std::vector<rendering::PoseEvidence> evidence = fine.evaluate(X_WO);
+  const Particle& followed = particles[turns.front().leader];
+  const std::shared_ptr<const RestingShape> shape = tools.meshes->resting_shape(*look.target.mesh);
   TurnFits fits;
   fits.pixels = std::max(kFewestRivalPixels, static_cast<double>(evidence[turns.front().leader].measured));
   fits.share = rendering::tempering(look.fine_terms.tempering.weight, fits.pixels, look.fine_terms.step);
   for (std::size_t i = 0; i < X_WO.size(); ++i) {
     TurnFit fit{X_WO[i], evidence[i], fits.share * evidence[i].log_ratio, look.prior.log(X_WO[i])};
+    if (followed.mode == belief::MotionMode::kResting)
+      fit.log_stands =
+          log_standing_odds(*shape, *look.frame.surfaces, look.frame.up_W, *look.target.mesh, X_WO[i], followed.X_WO);
     if (i >= particles.size() &&
         look.frame.surfaces->overlap(*look.target.mesh, X_WO[i], weighting.support_tolerance) > kMostInSupportOfRival)
       fit.log_frame = kNoEvidence;
@@ -177,7 +184,7 @@ int look_at_turns(const TurnLook& look, const SymmetryGroup& symmetry, const Wei
     turns[turn_of[i]].log_before = log_sum(turns[turn_of[i]].log_before, particles[i].log_weight);
   RivalSearch coarse(look.frame, look.terms, look.target, weighting, tools);
   RivalSearch fine(look.frame, look.fine_terms, look.fine_target, weighting, tools);
-  const TurnFits fits = fits_in(look, coarse, fine, symmetry, particles, turns, weighting);
+  const TurnFits fits = fits_in(look, coarse, fine, symmetry, particles, turns, weighting, tools);
   std::vector<JudgedTurn> judged = turns_before(fits.all, particles, turns, symmetry, look.cameras);
   // What was followed and has been turned since the start is known better than the scene says.
   const TurnFit& followed = *judged.front().fit;
@@ -186,7 +193,7 @@ int look_at_turns(const TurnLook& look, const SymmetryGroup& symmetry, const Wei
   // known.
   const auto log_of = [&](const TurnFit& fit) {
     if (fit.log_frame < followed.log_frame - kHopelessTurn) return fit.log(look.cameras);
-    return look.cameras * fits.share * fine.worth(fit.evidence, fit.X_WO) + fit.log_prior;
+    return look.cameras * fits.share * fine.worth(fit.evidence, fit.X_WO) + fit.log_prior + fit.log_stands;
   };
   const double log_followed = log_of(followed);
   double log_best = kNoEvidence;

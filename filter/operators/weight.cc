@@ -52,7 +52,7 @@ ParticleWeight update(const ParticleUpdate& frame, double dt, bool first, const 
   double log_moved = -std::numeric_limits<double>::infinity();
   if (within_reach(mode, predicted, dt, options)) {
     if (near != nullptr && near->covers(mode.X_WO) && near->covers(particle.X_WO))
-      log_moved = near->log_evidence(near->update(particle.X_WO, predicted.covariance));
+      log_moved = near->log_frame_evidence(near->update_by_frame(particle.X_WO, predicted.covariance));
     else
       log_moved = frame.weight_share() * worth(moved.evidence.log_ratio, moved.outline, options) -
                   0.5 * mode.shift.dot(predicted.information * mode.shift) +

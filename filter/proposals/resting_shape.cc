@@ -23,6 +23,7 @@ constexpr std::size_t kMostRests = 8;     // different ones
 constexpr double kLeastTip = 0.05;        // rad; what falls over sooner does not stand
 constexpr double kFlatCorner = 1e-6;      // m from the line through its neighbours
 constexpr double kLeastSideShare = 0.07;  // of what it covers is a side; those of a round thing's polygon are shorter
+constexpr double kBaseDepth = 0.0005;     // m; what is so near to the lowest point stands on the ground
 constexpr std::array<double, 2> kSlides = {0.012, 0.006};  // m, in turn
 constexpr double kHit = 0.012;  // m, growing with depth: a measurement so near shows the surface
 
@@ -38,6 +39,25 @@ std::vector<Vector2d> without_flat_corners(const std::vector<Vector2d>& corners)
     if (std::abs(way.x() * out.y() - way.y() * out.x()) > kFlatCorner * way.norm()) kept.push_back(apart[i]);
   }
   return kept;
+}
+
+/// Middle and second moments of the border of what stands on the ground.
+void add_base(const std::vector<Vector2d>& corners, Rest& rest) {
+  double around = 0.0;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Vector2d middle = 0.5 * (corners[i] + corners[(i + 1) % corners.size()]);
+    const Vector2d along = corners[(i + 1) % corners.size()] - corners[i];
+    const double length = along.norm();
+    around += length;
+    rest.base_middle += length * middle;
+    rest.base_moments += length * (middle * middle.transpose() + along * along.transpose() / 12.0);
+  }
+  if (!(around > 0.0)) {
+    if (!corners.empty()) rest.base_middle = corners.front();
+    return;
+  }
+  rest.base_middle /= around;
+  rest.base_moments = (rest.base_moments / around - rest.base_middle * rest.base_middle.transpose()).eval();
 }
 
 Rest rest_of(const rendering::RenderMesh& mesh, const Quaterniond& R_UO) {
@@ -65,6 +85,12 @@ Rest rest_of(const rendering::RenderMesh& mesh, const Quaterniond& R_UO) {
     const Vector2d& to = corners[(i + 1) % corners.size()];
     if ((to - from).norm() >= kLeastSideShare * around) rest.sides.push_back({from, to});
   }
+  std::vector<Vector2d> standing;
+  for (const auto& vertex : mesh.vertices) {
+    const Vector3d p = R_UO * vertex.cast<double>();
+    if (p.z() < rest.bottom + kBaseDepth) standing.emplace_back(p.head<2>());
+  }
+  add_base(geometry::convex_polygon(std::move(standing)), rest);
   rest.reach = std::max(0.0, geometry::distance_inside(corners, rest.middle));
   return rest;
 }
@@ -129,8 +155,13 @@ RestingShape resting_shape_of(const rendering::RenderMesh& mesh) {
   if (!poses.ok()) return shape;
   std::vector<std::array<double, 2>> heights;
   for (const geometry::RestingPose& pose : *poses) {
-    if (pose.tip_angle < kLeastTip && !shape.rests.empty()) continue;
+    if (pose.tip_angle < kLeastTip && !shape.rests.empty()) {
+      shape.rolling.push_back(pose.R_WB.conjugate() * Vector3d::UnitZ());
+      shape.rolling_probability += pose.probability;
+      continue;
+    }
     Rest rest = rest_of(mesh, pose.R_WB);
+    rest.probability = pose.probability;
     const std::array<double, 2> mine = {pose.height, rest.top - rest.bottom};
     std::size_t group = 0;
     while (group < heights.size() &&

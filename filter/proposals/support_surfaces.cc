@@ -76,6 +76,26 @@ int SupportSurfaces::crossings(const Part& part, const Vector3d& p, const Vector
                                         [&](const Triangle& t) { return meets(t.a, t.ab, t.ac, p, pq); }));
 }
 
+std::optional<SupportSurfaces::Hit> SupportSurfaces::first_along(const Vector3d& p_W, const Vector3d& direction_W,
+                                                                 double reach) const {
+  std::optional<Hit> first;
+  for (const Placed& placed : parts_) {
+    const Vector3d p = placed.in_part(p_W), q = placed.in_part(p_W + reach * direction_W);
+    if (!boxes_meet(placed.part->box, p, q)) continue;
+    const Vector3d pq = q - p;
+    for (const Triangle& triangle : placed.part->triangles) {
+      if (!meets(triangle.a, triangle.ab, triangle.ac, p, pq)) continue;
+      Vector3d normal = triangle.ab.cross(triangle.ac).normalized();
+      if (placed.part->closed && !(normal.dot(pq) < 0.0)) continue;  // from within
+      const double distance = reach * normal.dot(triangle.a - p) / normal.dot(pq);
+      if (first && first->distance <= distance) continue;
+      if (placed.X_PW) normal = placed.X_PW->rotation.conjugate() * normal;
+      first = Hit{distance, normal.dot(direction_W) < 0.0 ? normal : Vector3d(-normal)};
+    }
+  }
+  return first;
+}
+
 bool SupportSurfaces::crosses(const Vector3d& p_W, const Vector3d& q_W) const {
   return std::any_of(parts_.begin(), parts_.end(), [&](const Placed& placed) {
     return crossings(*placed.part, placed.in_part(p_W), placed.in_part(q_W)) > 0;

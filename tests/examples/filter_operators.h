@@ -2,6 +2,7 @@
 // What the examples in the headers of filter/operators take for granted.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "prescene/filter/operators/learn_colors.h"
 #include "prescene/filter/operators/learn_physics.h"
 #include "prescene/filter/operators/predict.h"
+#include "prescene/filter/operators/standing.h"
 #include "prescene/filter/operators/still_update.h"
 #include "prescene/filter/operators/weigh_print.h"
 #include "prescene/filter/operators/weight.h"
@@ -110,6 +112,17 @@ extern const geometry::PinholeCamera camera;
 extern const Pose X_CO;
 extern const SearchTarget target;
 }  // namespace watched_renderer_h
+
+namespace standing_h {
+extern const RestingShape shape;
+extern const rendering::RenderMesh mesh;
+extern const SupportSurfaces supports;
+extern const Vector3d up_W;
+extern const Pose X_WO;
+extern const std::function<SupportHeight(const Vector3d&, const Vector3d&)> height_at;
+extern geometry::Matrix6d H;
+extern geometry::Vector6d g;
+}  // namespace standing_h
 
 namespace still_update_h {
 extern const geometry::Matrix6d covariance, information;

@@ -163,16 +163,17 @@ TEST(StillObject, ComesToRestAndCostsLittle) {
   EXPECT_EQ(box.motion.back(), belief::MotionMode::kResting);
 }
 
+// Along the table, or up from it.
 TEST(StillObject, ASlowPushIsFollowed) {
   const Motion rest = box_at_rest();
-  for (const Vector3d& direction : {Vector3d(1.0, 0.0, 0.0), Vector3d(0.0, 1.0, 0.0)}) {
+  for (const Vector3d& direction : {Vector3d(1.0, 0.0, 0.0), Vector3d(0.0, 1.0, 0.0), Vector3d(0.0, 0.0, 1.0)}) {
     const auto pushed = [&](double time) {
       Pose X_WO = rest(time);
       X_WO.translation += std::max(0.0, time - 0.8) * 0.03 * direction;  // 1 mm in a frame
       return X_WO;
     };
     const Followed box = follow(pushed, 50, 12);
-    EXPECT_TRUE(box.always_tracked);
+    EXPECT_TRUE(box.always_tracked || direction.z() > 0.0);  // lifted, it may be doubtful for a frame
     double sum = 0.0;
     for (std::size_t i = 26; i < box.published.size(); ++i) {
       const double error = (box.published[i].translation - pushed(static_cast<double>(i) / 30.0).translation).norm();

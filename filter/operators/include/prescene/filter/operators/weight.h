@@ -12,6 +12,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/filter/proposals/frame.h"
+#include "prescene/filter/proposals/resting_starts.h"
 #include "prescene/filter/proposals/support_surfaces.h"
 
 namespace prescene::filter {
@@ -53,7 +54,12 @@ struct ParticleWeight {
 struct WeightContext {
   const SupportSurfaces* supports = nullptr;  ///< Where hidden poses cannot be; null = anywhere.
   const SupportSurfaces* solids = nullptr;    ///< The same of what no hand holds; null = no more.
-  bool was_unseen = false;                    ///< In the frame before.
+  const RestingShape* shape = nullptr;        ///< How it may stand on `supports`; null = in any way.
+  Vector3d up_W = Vector3d::UnitZ();          ///< Against gravity.
+  /// Depth of the supports alone, of the size of the frame's terms: how far off the frame shows them; null = not at
+  /// all.
+  const geometry::DepthImage* support_depth = nullptr;
+  bool was_unseen = false;  ///< In the frame before.
   /// The full depth image and its camera, for where the object ends in it; null = poses follow depth residuals alone.
   const geometry::DepthImage* depth = nullptr;
   geometry::PinholeCamera camera = {};

@@ -24,16 +24,22 @@ namespace prescene::filter {
 struct Rest {
   geometry::Quaterniond R_UO;
   double bottom = 0.0, top = 0.0;  ///< Heights in U, m.
+  double probability = 0.0;        ///< Of what falls from any rotation to lie so (geometry::RestingPose).
   /// Long straight sides of what it covers, seen from above, counter-clockwise; none of round things.
   std::vector<std::array<Eigen::Vector2d, 2>> sides;
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();  ///< Of what it covers ...
   double reach = 0.0;                                ///< ... and the least distance of that one's border from it.
+  /// Of the border of what it stands on, in U: its middle, m, and its second moments about that, m^2.
+  Eigen::Vector2d base_middle = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d base_moments = Eigen::Matrix2d::Zero();
 };
 
 /// What of a model tells how it may lie.
 struct RestingShape {
   std::vector<std::vector<Rest>> rests;        ///< Ways to lie that look alike together, likeliest first.
   std::vector<geometry::SurfacePoint> points;  ///< Spread over its surface, in O.
+  std::vector<Vector3d> rolling;               ///< Ups, in O, of faces from which it rolls on to the next ...
+  double rolling_probability = 0.0;            ///< ... and how often it comes to lie on one of them.
 };
 /// From the faces of the convex hull that carry the hull's centre of mass; empty for a flat mesh.
 RestingShape resting_shape_of(const rendering::RenderMesh& mesh);

@@ -33,6 +33,14 @@ class SupportSurfaces {
 
   bool empty() const { return parts_.empty(); }
 
+  /// A surface that a ray meets.
+  struct Hit {
+    double distance = 0.0;        ///< m, from where the ray begins.
+    geometry::Vector3d normal_W;  ///< Unit, towards where it begins.
+  };
+  /// The first surface within `reach` (m) from p_W along a unit direction; of closed supports, those that are entered.
+  std::optional<Hit> first_along(const geometry::Vector3d& p_W, const geometry::Vector3d& direction_W,
+                                 double reach) const;
   /// Whether the segment from p_W to q_W crosses a surface.
   bool crosses(const geometry::Vector3d& p_W, const geometry::Vector3d& q_W) const;
   /// Whether the point lies inside a closed support (by the parity of the surfaces between it and a point far away).
