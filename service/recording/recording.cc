@@ -70,7 +70,10 @@ core::Status RecordingWriter::begin(const RecordingInfo& info) {
     metadata.values["first_message"] = std::to_string(info.part.first_message);
     metadata.values["began_ns"] = std::to_string(info.part.began_ns);
     metadata.values["after_gap"] = info.part.after_gap ? "yes" : "no";
-    if (!info.part.bounded_as.empty()) metadata.values["bounded_as"] = info.part.bounded_as;
+    if (!info.part.bounded_as.empty()) {
+      metadata.values["bounded_as"] = info.part.bounded_as;
+      metadata.values["first_file"] = info.part.first_file;
+    }
   }
   metadata.values[kCrcKey] = crc_text(metadata.values);
   next_index_ = info.part.first_message;

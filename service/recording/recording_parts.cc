@@ -82,6 +82,7 @@ RecordingPart part_from(const interfaces::McapMetadata& metadata) {
   part.began_ns = std::min<core::TimeNs>(static_cast<core::TimeNs>(number("began_ns")), kLatestRecordedNs);
   part.after_gap = value("after_gap") == "yes";
   part.bounded_as = value("bounded_as");
+  part.first_file = value("first_file");
   return part;
 }
 

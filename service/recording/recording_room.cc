@@ -4,6 +4,7 @@
 #include <dirent.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <set>
 #include <system_error>
 
@@ -13,13 +14,24 @@
 namespace prescene::service {
 namespace {
 
-/// What is in a folder, in no order; nothing where it can't be read. The iterator of libstdc++ 12 would end the program
-/// where there is no memory.
+/// What is in a folder, in no order; nothing where not all of it can be read. The iterator of libstdc++ 12 would end
+/// the program where there is no memory.
 std::vector<std::string> names_in(const std::filesystem::path& folder) {
   const std::unique_ptr<DIR, int (*)(DIR*)> open(::opendir(folder.c_str()), &::closedir);
   std::vector<std::string> names;
-  while (const dirent* entry = open ? ::readdir(open.get()) : nullptr) names.emplace_back(entry->d_name);
+  if (!open) return names;
+  errno = 0;
+  while (const dirent* entry = ::readdir(open.get())) {
+    names.emplace_back(entry->d_name);
+    errno = 0;
+  }
+  if (errno != 0) names.clear();
   return names;
+}
+
+/// Whether a file is called as it was when it was written.
+bool has_its_name(const std::filesystem::path& file, const RecordingPart& part) {
+  return part_path(part.first_file, part.number) == file.filename();
 }
 
 /// Takes off the number of at least so many digits that ends `text` after `mark`, and the mark. False where there is
@@ -51,7 +63,8 @@ std::string RecordingRoom::series_of(const Earlier& file) {
   if (known != known_.end() && known->second.bytes == file.bytes && known->second.written == file.written)
     return known->second.series;
   Known now{file.bytes, file.written, ""};
-  if (const auto part = part_of(file.file); part && part->bounded_as == part_.bounded_as) now.series = part->series;
+  const auto part = part_of(file.file);
+  if (part && part->bounded_as == part_.bounded_as && has_its_name(file.file, *part)) now.series = part->series;
   return known_.insert_or_assign(file.file, std::move(now)).first->second.series;
 }
 
@@ -62,10 +75,12 @@ std::vector<RecordingRoom::Earlier> RecordingRoom::earlier_runs() {
     if (!is_called_as(name, part_.bounded_as)) continue;
     Earlier earlier{folder_ / name, 0, {}};
     std::error_code error;
-    if (std::filesystem::symlink_status(earlier.file, error).type() != std::filesystem::file_type::regular) continue;
-    earlier.bytes = std::filesystem::file_size(earlier.file, error);
+    const std::filesystem::file_type type = std::filesystem::symlink_status(earlier.file, error).type();
+    if (type == std::filesystem::file_type::not_found) continue;  // gone meanwhile
+    if (!error && type != std::filesystem::file_type::regular) continue;
+    if (!error) earlier.bytes = std::filesystem::file_size(earlier.file, error);
     if (!error) earlier.written = std::filesystem::last_write_time(earlier.file, error);
-    if (error) continue;
+    if (error) return {};  // it may be the one by which its run is known to go on
     const std::string series = series_of(earlier);
     if (in_use.contains(series)) continue;
     if (interfaces::is_in_use(earlier.file)) in_use.insert(series);
@@ -80,8 +95,23 @@ std::vector<RecordingRoom::Earlier> RecordingRoom::earlier_runs() {
   return earlier;
 }
 
+bool RecordingRoom::is_own(const std::filesystem::path& file) const {
+  std::error_code error;
+  if (std::filesystem::symlink_status(file, error).type() != std::filesystem::file_type::regular) return false;
+  const auto part = part_of(file);
+  return part && part->series == part_.series && has_its_name(file, *part);
+}
+
 std::vector<RemovedFile> RecordingRoom::make_room(const std::vector<std::filesystem::path>& own) {
   std::vector<Earlier> files = earlier_runs();
+  if (!files.empty()) {
+    // A run that goes on in another file is in use by that one, which was perhaps not there when the folder was read.
+    const std::vector<Earlier> again = earlier_runs();
+    std::erase_if(files, [&](const Earlier& one) {
+      return std::none_of(again.begin(), again.end(), [&](const Earlier& other) { return other.file == one.file; });
+    });
+  }
+  const std::size_t of_others = files.size();
   std::uint64_t sum = 0;
   for (const std::filesystem::path& file : own) {
     std::error_code error;
@@ -93,13 +123,12 @@ std::vector<RemovedFile> RecordingRoom::make_room(const std::vector<std::filesys
   std::vector<RemovedFile> removed;
   for (std::size_t i = 0; i + stay < files.size() && sum > keep_bytes_; ++i) {
     std::error_code error;
-    const bool was_there = std::filesystem::remove(files[i].file, error);
+    // One of this run that was moved away is gone, whatever is in its place.
+    if (i < of_others || is_own(files[i].file)) std::filesystem::remove(files[i].file, error);
     if (!error) sum -= files[i].bytes;
     known_.erase(files[i].file);
-    if (error)
-      removed.push_back({files[i].file, files[i].file.string() + " can't be removed: " + error.message()});
-    else if (was_there)
-      removed.push_back({files[i].file, ""});
+    removed.push_back(
+        {files[i].file, error ? files[i].file.string() + " can't be removed: " + error.message() : std::string()});
   }
   return removed;
 }

@@ -62,9 +62,12 @@ class RecordingRoom {
     std::uint64_t bytes = 0;
     std::filesystem::file_time_type written;
   };
+  /// Nothing where not all of the folder can be read.
   std::vector<Earlier> earlier_runs();
   /// Of a file that may go for want of room: the series that it is of; "" = it may not.
   std::string series_of(const Earlier& file);
+  /// Whether a file of this run is still there as it was written.
+  bool is_own(const std::filesystem::path& file) const;
 
   std::filesystem::path folder_;
   RecordingPart part_;

@@ -30,9 +30,11 @@ core::Result<std::unique_ptr<RollingRecording>> RollingRecording::create(const s
                                                                          RecordingInfo info,
                                                                          const RollingOptions& options,
                                                                          core::LogSink log) {
-  info.part = {new_series(path), 0, 0, core::steady_now_ns(), false, ""};
-  if (options.part.keep_bytes > 0)
+  info.part = {.series = new_series(path), .began_ns = core::steady_now_ns()};
+  if (options.part.keep_bytes > 0) {
     info.part.bounded_as = (options.asked.empty() ? path : options.asked).filename().string();
+    info.part.first_file = path.filename().string();
+  }
   PRESCENE_TRY(const auto file, NewFile::create(path));
   PRESCENE_TRY(auto writer, RecordingWriter::create(path, info, options.safety));
   std::unique_ptr<RollingRecording> recording(new RollingRecording(path, std::move(info), options, std::move(log)));

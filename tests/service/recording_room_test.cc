@@ -122,6 +122,8 @@ TEST_F(RecordingRoomTest, NothingElseGoes) {
   record("walk.mcap", bounded);   // the same
   record("aside.mcap", {.part = bounded.part, .asked = file("run.mcap")});
   std::filesystem::rename(file("aside.mcap"), file("run-saved.mcap"));  // by a person
+  record("aside.mcap", {.part = bounded.part, .asked = file("run.mcap")});
+  std::filesystem::rename(file("aside.mcap"), file("run-20261127.mcap"));  // and to a name that a run could have
   ASSERT_TRUE(interfaces::write_file(file("run-7.mcap"), noise(kBytes)).ok());
   ASSERT_TRUE(interfaces::write_file(file("run_0001.txt"), noise(kBytes)).ok());
   auto simulated = RecordingWriter::create(file("run-8.mcap"), {});

@@ -32,6 +32,9 @@ struct RecordingPart {
   bool after_gap = false;          ///< Something was not recorded between it and the one before.
   /// The file name under which it was asked to keep only so much; "" = it stays (PartLimits::keep_bytes).
   std::string bounded_as = "";
+  /// With that, the name of the first file of its run: a file that is not called as part_path() says was renamed or
+  /// copied since, and is nobody's to remove.
+  std::string first_file = "";
 };
 
 /// What a recording says about itself, in its metadata record "prescene", with a checksum: in a recording that was cut
