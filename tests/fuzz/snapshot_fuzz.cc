@@ -22,7 +22,8 @@ std::shared_ptr<const belief::Scene> scene() {
   static const std::shared_ptr<const belief::Scene> kScene = [] {
     constexpr const char* kText =
         "name: two\nnew_objects: true\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\n"
-        "supports:\n  floor: {ground: {size: 4}}\nrobot:\n  hand: {parts: [{box: [0.05, 0.05, 0.04]}]}\n"
+        "supports:\n  floor: {ground: {size: 4}}\nrobot:\n  hand: {parts: [{box: [0.05, 0.05, 0.04]}], pose: "
+        "{position: [0, 0, 1]}}\n"
         "objects:\n  a: {model: box, pose: {position: [0, 0, 0.05]}}\n"
         "  b: {model: box, pose: {position: [1, 0, 0.05]}}\n";
     interfaces::FileReport report;
