@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "fuzz_scene.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/check.h"
-#include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/belief_summary.h"
 
 namespace {
@@ -17,16 +17,10 @@ namespace {
 using namespace prescene;  // NOLINT(google-build-using-namespace)
 
 std::shared_ptr<const belief::Scene> scene() {
-  static const std::shared_ptr<const belief::Scene> kScene = [] {
-    constexpr const char* kText =
-        "name: two\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\nsupports:\n  floor: {ground: {size: 4}}\n"
-        "objects:\n  a: {model: box, pose: {position: [0, 0, 0.05]}}\n"
-        "  b: {model: box, pose: {position: [1, 0, 0.05]}}\n";
-    interfaces::FileReport report;
-    auto read = interfaces::parse_scene(kText, "two.yaml", {}, &report);
-    PRESCENE_CHECK_MSG(read.ok(), read.status().message());
-    return std::make_shared<const belief::Scene>(*std::move(read));
-  }();
+  static const auto kScene = fuzz::scene_from(
+      "name: two\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\nsupports:\n  floor: {ground: {size: 4}}\n"
+      "objects:\n  a: {model: box, pose: {position: [0, 0, 0.05]}}\n"
+      "  b: {model: box, pose: {position: [1, 0, 0.05]}}\n");
   return kScene;
 }
 

@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "fuzz_scene.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/check.h"
 #include "prescene/core/hash.h"
-#include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/tracking/tracker_snapshot.h"
 
@@ -19,18 +19,12 @@ namespace {
 using namespace prescene;  // NOLINT(google-build-using-namespace)
 
 std::shared_ptr<const belief::Scene> scene() {
-  static const std::shared_ptr<const belief::Scene> kScene = [] {
-    constexpr const char* kText =
-        "name: two\nnew_objects: true\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\n"
-        "supports:\n  floor: {ground: {size: 4}}\nrobot:\n  hand: {parts: [{box: [0.05, 0.05, 0.04]}], pose: "
-        "{position: [0, 0, 1]}}\n"
-        "objects:\n  a: {model: box, pose: {position: [0, 0, 0.05]}}\n"
-        "  b: {model: box, pose: {position: [1, 0, 0.05]}}\n";
-    interfaces::FileReport report;
-    auto read = interfaces::parse_scene(kText, "two.yaml", {}, &report);
-    PRESCENE_CHECK_MSG(read.ok(), read.status().message());
-    return std::make_shared<const belief::Scene>(*std::move(read));
-  }();
+  static const auto kScene = fuzz::scene_from(
+      "name: two\nnew_objects: true\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\n"
+      "supports:\n  floor: {ground: {size: 4}}\nrobot:\n  hand: {parts: [{box: [0.05, 0.05, 0.04]}], pose: "
+      "{position: [0, 0, 1]}}\n"
+      "objects:\n  a: {model: box, pose: {position: [0, 0, 0.05]}}\n"
+      "  b: {model: box, pose: {position: [1, 0, 0.05]}}\n");
   return kScene;
 }
 
