@@ -35,8 +35,9 @@ constexpr int kHiddenDraws = 160;       // places that are tried for what may ha
 constexpr double kFurthestFall = 0.3;   // m
 constexpr double kHiddenTurn = 0.8;     // rad
 
-constexpr double kSameShift = 0.01;  // m; a find that is no further than this ...
-constexpr double kSameTurn = 0.2;    // rad; ... from where it is tracked is no other place
+constexpr double kTrackedError = 0.003;  // m; scale of the errors of what is tracked
+constexpr double kSameShift = 0.01;      // m; a find that is no further than this ...
+constexpr double kSameTurn = 0.2;        // rad; ... from where it is tracked is no other place
 
 bool lighter(const Particle& a, const Particle& b) { return a.log_weight < b.log_weight; }
 
@@ -96,6 +97,13 @@ bool is_same_place(const Pose& X_CO, const Pose& other_X_CO, const SearchTarget&
   return shift < kSameShift && turn < kSameTurn;
 }
 
+/// nats, tempered, by which a frame must favour a place for what is tracked so far from there: errors of tracked poses
+/// have the tails of Student's t distribution with one degree of freedom.
+double log_odds_against_jump(double distance) {
+  const double scaled = distance / kTrackedError;
+  return 2.0 * std::log1p(scaled * scaled);
+}
+
 /// Whether what a find must say for each pixel depends on what the frame can say there.
 enum class Limit { kScaled, kInFull };
 
@@ -153,7 +161,10 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   const double shown = e.in_view > 0 ? static_cast<double>(e.visible) / e.in_view : 0.0;
   if (e.log_ratio < current.log_ratio + options.min_gain || shown < kLeastShown) return false;
   // Of a tracked object, the particles know that place better than a search of one frame.
-  if (object.state == belief::TrackState::kTracked && is_same_place(found.X_CO, X_CO, target)) return false;
+  const double distance = (found.X_CO * target.centre() - X_CO * target.centre()).norm();
+  if (object.state == belief::TrackState::kTracked &&
+      (is_same_place(found.X_CO, X_CO, target) || e.tempered - current.tempered < log_odds_against_jump(distance)))
+    return false;
   const Pose X_WO = frame.X_WC * found.X_CO;
   // A support that is a little higher than the scene says looks like the top of something inside it.
   if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > kMostOverlap) return false;
@@ -167,7 +178,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   };
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double reach = std::max(0.10, options.reach_speed * unseen);
-  const bool far = (found.X_CO * target.centre() - X_CO * target.centre()).norm() > reach;
+  const bool far = distance > reach;
   // More of an arm that no scene knows may look like the object than is seen of it in that arm's hand. But what is seen
   // where it is believed to be cannot be out of reach of there.
   if (far && as_find(X_CO, current, options.accept_evidence, Limit::kScaled)) return false;

@@ -184,6 +184,27 @@ TEST_F(ABox, IsNotRecoveredFromWhereItIsExplainedAsWell) {
   EXPECT_EQ(object, before);
 }
 
+// Some pixels more that fit by chance do not move what is tracked by centimetres.
+TEST_F(ABox, WhatIsTrackedJumpsOnlyWhereTheFrameSaysSoTheMoreTheFurtherItIs) {
+  see(X_WO_);
+  const rendering::PoseEvidence there = evidence_of(X_WO_);
+  const auto jumps = [&](double distance, double gain, belief::TrackState state) {
+    Pose aside = X_WO_;
+    aside.translation.x() += distance;
+    ObjectBelief object = believed_at(aside, frame_.stamp_ns);
+    object.state = state;
+    rendering::PoseEvidence current = there;
+    current.tempered -= gain;
+    current.log_ratio -= 2.0 * AugmentOptions().min_gain;
+    return recover(frame_, frame_.terms, target_, current, {}, {}, {}, backends_.tools, {6, core::Purpose::kRecovery},
+                   object);
+  };
+  EXPECT_FALSE(jumps(0.06, 8.0, belief::TrackState::kTracked));
+  EXPECT_TRUE(jumps(0.06, 30.0, belief::TrackState::kTracked));
+  EXPECT_TRUE(jumps(0.02, 10.0, belief::TrackState::kTracked));
+  EXPECT_TRUE(jumps(0.06, 8.0, belief::TrackState::kUnseen));
+}
+
 TEST_F(ABox, AFindOutOfReachNeedsMoreEvidence) {
   see(X_WO_);
   AugmentOptions options;
