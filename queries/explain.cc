@@ -22,12 +22,15 @@ namespace prescene::queries {
 namespace {
 
 using belief::EventKind;
+using Clock = core::Cancellation::Clock;
 
 constexpr int kFirstRuns = 1;
-constexpr int kLaterFirstPoints = 2;  // times the points of a run, that are drawn where the runs before found it
-constexpr int kMostRounds = 2;        // times the query's runs: of what stays uncertain
-constexpr double kHopeless = 25.0;    // nats: what is so far behind the best is not searched further
-constexpr int kFreshRuns = 1000;      // numbers of runs from here on are for what must not have been seen
+constexpr int kLaterFirstPoints = 2;        // times the points of a run, that are drawn where the runs before found it
+constexpr int kMostRounds = 2;              // times the query's runs: of what stays uncertain
+constexpr double kHopeless = 25.0;          // nats: what is so far behind the best is not searched further
+constexpr double kMayMatter = 0.01;         // probability from which on an event that was not searched is named
+constexpr std::size_t kPointsInHaste = 24;  // of a posterior, that are worked out when the time is out
+constexpr int kFreshRuns = 1000;            // numbers of runs from here on are for what must not have been seen
 constexpr double kLikelierThanSeen =
     3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
 
@@ -61,9 +64,11 @@ class Explainer {
     const std::vector<Hypothesis> hypotheses = hypotheses_about(candidates, *events_, query_.weights, *tools_.meshes);
     PRESCENE_RETURN_IF_ERROR(search_all(candidates, hypotheses));
     PRESCENE_RETURN_IF_ERROR(search_rivals());
+    PRESCENE_RETURN_IF_ERROR(narrow_intervals());
     PRESCENE_RETURN_IF_ERROR(events_->failure());
     remark_what_was_cut_short();
     JudgedEvents judged{window_, *events_, *likelihood_, times_, nothings_, judged_, chosen_};
+    if (out_of_time_) judged.points = kPointsInHaste;
     ExplainAnswer answer = explain_answer(judged);
     if (query_.change) {
       add_change(answer);
@@ -86,8 +91,18 @@ class Explainer {
   /// Notes it.
   bool out_of_time() {
     const auto& until = context_.simulation.simulate_until;
-    out_of_time_ = out_of_time_ || (until && core::Cancellation::Clock::now() >= *until);
+    out_of_time_ = out_of_time_ || (until && Clock::now() >= *until);
     return out_of_time_;
+  }
+
+  /// Whether a search's share of the time that is left is over: it, and so many after it that take long, share it.
+  std::function<bool()> share_of_time(std::size_t searches) const {
+    const auto& until = context_.simulation.simulate_until;
+    if (!until) return {};
+    const auto now = Clock::now();
+    const auto share =
+        std::max(Clock::duration::zero(), *until - now) / static_cast<std::int64_t>(std::max<std::size_t>(1, searches));
+    return [end = now + share] { return Clock::now() >= end; };
   }
 
   core::Status look_up_wanted() {
@@ -192,17 +207,41 @@ class Explainer {
     evaluated_ += static_cast<int>(points.size());
   }
 
+  double evidence_of_nothing(std::size_t object) const {
+    for (const Judged& nothing : nothings_)
+      if (nothing.object == object) return nothing.log_bayes;
+    return 0.0;
+  }
+
+  /// No path of the object has a greater log likelihood.
+  double most_likely(std::size_t object) const { return others_[object].most_likely + kLikelierThanSeen; }
+
+  double log_posterior(const Judged& judged) const {
+    return std::log(judged.hypothesis.prior) + judged.log_bayes + evidence_of_nothing(judged.object);
+  }
+
+  static int runs_of(const Judged& judged) { return static_cast<int>(judged.posterior.log_evidence.size()); }
+
+  /// Against `nothing` about its object; of that itself, as it is.
+  void note_evidence(Judged& judged, double log_evidence) {
+    const bool is_reference = judged.hypothesis.kind == EventKind::kNothing && !judged.hypothesis.begins_otherwise;
+    judged.log_bayes = log_evidence - (is_reference ? 0.0 : evidence_of_nothing(judged.object));
+    judged.may_be_more.reset();
+    if (judged.posterior.unfinished)
+      judged.may_be_more = std::max(0.0, most_likely(judged.object) - log_evidence);
+    else if (!judged.posterior.gave_up)
+      best_ = std::max(best_, std::log(judged.hypothesis.prior) + log_evidence);
+  }
+
   /// `runs` more searches of it; of `other`, which needs none, the evidence.
-  void search(Judged& judged, int runs) {
+  void search(Judged& judged, int runs, const std::function<bool()>& out_of_time) {
     const Hypothesis& hypothesis = judged.hypothesis;
-    const core::RandomStream stream = stream_of(judged);
     if (hypothesis.kind == EventKind::kOther) {
-      const OtherMotion other = other_motion(*events_, *likelihood_, hypothesis.object, query_.priors);
-      judged.log_bayes = other.log_evidence;
+      const OtherMotion& other = others_[judged.object];
       judged.error = other.error;
       judged.other_path = other.path;
       judged.frame_means = other.frames;
-      most_likely_ = other.most_likely + kLikelierThanSeen;
+      note_evidence(judged, other.log_evidence);
       return;
     }
     TemperedTarget target;
@@ -213,19 +252,27 @@ class Explainer {
     TemperedOptions options;
     options.runs = runs;
     options.points = query_.points;
-    options.first_run = static_cast<int>(judged.posterior.log_evidence.size());
+    options.first_run = runs_of(judged);
+    options.out_of_time = out_of_time;
     if (options.first_run > 0) {
       propose_from(judged.posterior, target);
       options.first_points = kLaterFirstPoints;
+    } else {
+      propose_from_other_touch(hypothesis, target);
+      if (hypothesis.kind != EventKind::kNothing || hypothesis.begins_otherwise) {
+        options.most_likely = most_likely(judged.object);
+        options.give_up_below = best_ - kHopeless - std::log(hypothesis.prior);
+      }
     }
-    if (options.first_run == 0) propose_from_other_touch(hypothesis, target);
-    if (options.first_run == 0 && (hypothesis.kind != EventKind::kNothing || hypothesis.begins_otherwise)) {
-      options.most_likely = most_likely_;
-      options.give_up_below = best_ - kHopeless - std::log(hypothesis.prior);
+    TemperedResult found = tempered_posterior(target, options, stream_of(judged), context_.simulation.cancellation);
+    if (options.first_run == 0) {
+      judged.posterior = std::move(found);
+    } else {
+      if (found.unfinished) return;  // what was found before stands
+      judged.posterior = merge(judged.posterior, found);
+      judged.posterior.unfinished = false;
     }
-    TemperedResult found = tempered_posterior(target, options, stream, context_.simulation.cancellation);
-    judged.posterior = options.first_run == 0 ? std::move(found) : merge(judged.posterior, found);
-    judged.log_bayes = judged.posterior.mean_log_evidence;
+    note_evidence(judged, judged.posterior.mean_log_evidence);
   }
 
   /// A blow touches about when and where a push does that explains the same frames, and the other way round.
@@ -237,7 +284,9 @@ class Explainer {
         propose_from(judged.posterior, kTouchDimensions, target);
   }
 
-  /// When an event is searched; nothing is before all others.
+  /// When an event is searched, after `nothing`. `other` first: it says how likely the frames can get at all. Then what
+  /// takes no simulation: the better the best of these, the sooner searches of the others end.
+  static constexpr int kRounds = 3;
   static int round_of(const Hypothesis& hypothesis) {
     const EventKind kind = hypothesis.kind;
     if (kind == EventKind::kNothing) return hypothesis.begins_otherwise ? 1 : -1;
@@ -245,73 +294,67 @@ class Explainer {
     return kind == EventKind::kPushed || kind == EventKind::kBumped || kind == EventKind::kSlipped ? 2 : 1;
   }
 
-  /// Each hypothesis once; those that can't compete end early.
+  /// Each hypothesis once; those that can't compete end early, and those that there is no time for are left open.
   core::Status search_all(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses) {
     double prior_of_nothing = 0.0;
-    for (const Hypothesis& h : hypotheses)
+    std::size_t simulated = events_->is_still() ? 0 : candidates.size();
+    for (const Hypothesis& h : hypotheses) {
       if (h.kind == EventKind::kNothing && !h.begins_otherwise) prior_of_nothing = h.prior;
-    for (const std::size_t object : candidates) {
+      if (round_of(h) == kRounds - 1) ++simulated;
+    }
+    others_.resize(events_->objects().size());
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      const std::size_t object = candidates[c];
+      others_[object] = other_motion(*events_, *likelihood_, object, query_.priors);
       Judged& nothing = nothings_.emplace_back();
       nothing.hypothesis = {EventKind::kNothing, object, {}, prior_of_nothing};
       nothing.object = object;
-      nothing.number = number_++;
-      search(nothing, query_.runs);
-      best_ = std::max(best_, std::log(prior_of_nothing) + nothing.log_bayes);
-      std::vector<const Hypothesis*> about;
-      // `other` first: it says how likely the frames can get at all. Then what
-      // takes no simulation: the better the best of these, the sooner searches
-      // of the others end.
-      for (const int round : {0, 1, 2})
-        for (const Hypothesis& hypothesis : hypotheses)
-          if (hypothesis.object == object && round_of(hypothesis) == round) about.push_back(&hypothesis);
-      const std::uint64_t first = number_;
-      for (const Hypothesis* hypothesis : about) {
-        if (cancelled()) return stopped();
-        if (out_of_time())
-          return core::unavailable(
-              "the time ran out before every event was searched once: give "
-              "more of it, an object, or a shorter window");
-        Judged& judged = judged_.emplace_back();
-        judged.hypothesis = *hypothesis;
-        judged.object = object;
-        judged.number = first + static_cast<std::uint64_t>(hypothesis - hypotheses.data());
-        search(judged, kFirstRuns);
-        best_ = std::max(best_, std::log(hypothesis->prior) + judged.log_bayes);
-        judged.log_bayes -= nothings_.back().log_bayes;
-      }
-      number_ = first + hypotheses.size();
+      nothing.number = c * (hypotheses.size() + 1);
+      if (cancelled()) return stopped();
+      search(nothing, query_.runs, share_of_time(simulated));
+      if (!events_->is_still()) --simulated;
     }
+    for (int round = 0; round < kRounds; ++round)
+      for (std::size_t c = 0; c < candidates.size(); ++c)
+        for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+          if (hypotheses[i].object != candidates[c] || round_of(hypotheses[i]) != round) continue;
+          if (cancelled()) return stopped();
+          Judged& judged = judged_.emplace_back();
+          judged.hypothesis = hypotheses[i];
+          judged.object = candidates[c];
+          judged.number = c * (hypotheses.size() + 1) + 1 + i;
+          if (round > 0 && out_of_time()) {
+            judged.posterior.unfinished = true;
+            note_evidence(judged, best_ - kHopeless - std::log(hypotheses[i].prior));
+          } else {
+            search(judged, kFirstRuns, share_of_time(round + 1 == kRounds ? simulated-- : 1));
+          }
+        }
     return core::ok_status();
   }
 
-  /// More runs of those that compete, until the intervals are narrow.
+  /// More runs of those that compete: one more of each in turn, as what one finds may show that another can't.
   core::Status search_rivals() {
-    const auto evidence_of_nothing = [&](const Judged& judged) {
-      for (const Judged& nothing : nothings_)
-        if (nothing.object == judged.object) return nothing.log_bayes;
-      return 0.0;
-    };
-    const auto more = [&](Judged& judged, int runs) {
-      search(judged, runs);
-      judged.log_bayes -= evidence_of_nothing(judged);
-    };
-    const auto runs_of = [](const Judged& judged) { return static_cast<int>(judged.posterior.log_evidence.size()); };
-    const auto log_posterior = [&](const Judged& judged) {
-      return std::log(judged.hypothesis.prior) + judged.log_bayes + evidence_of_nothing(judged);
-    };
     // That nothing explains what was seen may only mean that a search missed:
     // then none is taken for hopeless.
     const bool unexplained = std::any_of(judged_.begin(), judged_.end(), [&](const Judged& judged) {
       return judged.hypothesis.kind == EventKind::kOther && log_posterior(judged) >= best_ - 1e-9;
     });
-    for (Judged& judged : judged_) {
-      const bool hopeless = judged.posterior.gave_up || log_posterior(judged) <= best_ - kHopeless;
-      if (judged.hypothesis.kind == EventKind::kOther || (hopeless && !unexplained)) continue;
-      if (cancelled()) return stopped();
-      if (out_of_time()) break;
-      more(judged, std::max(1, query_.runs - runs_of(judged)));
-      if (unexplained) judged.posterior.gave_up = false;  // the run that did counts as one without evidence
-    }
+    for (int runs = kFirstRuns; runs < query_.runs; ++runs)
+      for (Judged& judged : judged_) {
+        const bool hopeless =
+            judged.posterior.gave_up || log_posterior(judged) + judged.may_be_more.value_or(0.0) <= best_ - kHopeless;
+        if (judged.hypothesis.kind == EventKind::kOther || (hopeless && !unexplained)) continue;
+        if (cancelled()) return stopped();
+        if (out_of_time()) return core::ok_status();
+        search(judged, 1, [this] { return out_of_time(); });
+        if (unexplained) judged.posterior.gave_up = false;  // the run that did counts as one without evidence
+      }
+    return core::ok_status();
+  }
+
+  /// More runs of those whose intervals are wide, as long as there is time.
+  core::Status narrow_intervals() {
     for (;;) {
       weigh_events(nothings_, judged_, query_.confidence, query_.seed);
       if (cancelled()) return stopped();
@@ -324,7 +367,7 @@ class Explainer {
           least = &judged;
       }
       if (least == nullptr || out_of_time()) return core::ok_status();
-      more(*least, std::max(2, query_.runs / 2));
+      search(*least, std::max(2, query_.runs / 2), [this] { return out_of_time(); });
     }
   }
 
@@ -335,12 +378,21 @@ class Explainer {
       remarks_.emplace_back(
           "The time ran out before the intervals were as narrow as asked for: "
           "give more of it (max_seconds).");
-    for (const Judged& judged : judged_)
+    const auto note = [&](const Judged& judged) {
+      if (judged.may_be_more && judged.high >= kMayMatter)
+        remarks_.push_back(
+            std::string("There was no time to search '") + belief::name_of(judged.hypothesis.kind) + "' of " +
+            events_->objects()[judged.object].name +
+            " to the end: it may be anything in its interval. Give more time (max_seconds), an object, or a "
+            "shorter window.");
       if (judged.posterior.cut_short)
         remarks_.push_back(std::string("The search for '") + belief::name_of(judged.hypothesis.kind) + "' of " +
                            events_->objects()[judged.object].name +
                            " was cut short: its probability is less certain "
                            "than its interval says.");
+    };
+    for (const std::vector<Judged>* some : {&nothings_, &judged_})
+      for (const Judged& judged : *some) note(judged);
   }
 
   const ExplainWindow& window_;
@@ -353,11 +405,10 @@ class Explainer {
   std::vector<WindowFrame> frames_;  // these
   std::unique_ptr<WindowLikelihood> likelihood_;
   std::vector<double> times_;
-  std::vector<Judged> nothings_;  // by candidate
-  std::vector<Judged> judged_;    // all others
-  double best_ = -1e300;          // greatest log prior + log evidence until now
-  double most_likely_ = 0.0;      // no path has a greater log likelihood
-  std::uint64_t number_ = 0;
+  std::vector<Judged> nothings_;     // by candidate
+  std::vector<Judged> judged_;       // all others
+  double best_ = -1e300;             // greatest log prior + log evidence until now
+  std::vector<OtherMotion> others_;  // by object; of the candidates
   std::vector<std::string> remarks_;
   int evaluated_ = 0;
   bool out_of_time_ = false;

@@ -15,9 +15,8 @@ namespace {
 using belief::EventKind;
 using belief::Pose;
 
-constexpr std::size_t kReportedPoints = 96;  // of a posterior: its summary is computed from so many
-constexpr std::uint64_t kPlaceDraws = 32;    // from each part of a place's distribution
-constexpr double kLeastDetailed = 0.002;     // probability from which on the parameters of an event are worked out
+constexpr std::uint64_t kPlaceDraws = 32;  // from each part of a place's distribution
+constexpr double kLeastDetailed = 0.002;   // probability from which on the parameters of an event are worked out
 
 /// Quantiles of weighted values.
 double value_quantile(std::vector<std::pair<double, double>> values, double share) {
@@ -76,7 +75,8 @@ class AnswerBuilder {
         times_(events.times),
         nothings_(events.nothings),
         judged_(events.judged),
-        frames_(events.frames) {}
+        frames_(events.frames),
+        most_points_(events.points) {}
 
   ExplainAnswer answer() {
     ExplainAnswer answer;
@@ -127,14 +127,14 @@ class AnswerBuilder {
     return judged.hypothesis.kind == EventKind::kNothing && !judged.hypothesis.begins_otherwise;
   }
 
-  /// At most kReportedPoints of equal weights, every so many of them by weight.
-  static void thin_out(std::vector<TemperedPoint>& points) {
-    if (points.size() <= kReportedPoints) return;
+  /// At most so many of equal weights, every so many of them by weight.
+  void thin_out(std::vector<TemperedPoint>& points) const {
+    if (points.size() <= most_points_) return;
     std::vector<TemperedPoint> kept;
     double reached = 0.0;
     for (const TemperedPoint& point : points) {
-      reached += point.weight * static_cast<double>(kReportedPoints);
-      while (kept.size() < kReportedPoints && static_cast<double>(kept.size()) + 0.5 < reached) kept.push_back(point);
+      reached += point.weight * static_cast<double>(most_points_);
+      while (kept.size() < most_points_ && static_cast<double>(kept.size()) + 0.5 < reached) kept.push_back(point);
     }
     for (TemperedPoint& point : kept) point.weight = 1.0 / static_cast<double>(kept.size());
     points = std::move(kept);
@@ -317,6 +317,7 @@ class AnswerBuilder {
   std::vector<Judged>& nothings_;
   std::vector<Judged>& judged_;
   const std::vector<std::size_t>& frames_;
+  std::size_t most_points_;
 };
 
 }  // namespace

@@ -31,6 +31,8 @@ struct Judged {
   std::vector<UnseenEnd> unseen_ends;                   // of its object; empty = as its paths end
   std::vector<double> frame_means;                      // of the log ratio in each frame
   std::vector<std::optional<belief::Pose>> other_path;  // of `other`
+  /// Where the time ran out before it was searched once: nats that log_bayes may be more by, and that it is not.
+  std::optional<double> may_be_more;
   double probability = 0.0, low = 0.0, high = 1.0;
 };
 
@@ -42,6 +44,7 @@ struct JudgedEvents {
   std::vector<Judged>& nothings;           // by candidate; the first is reported
   std::vector<Judged>& judged;             // all others
   const std::vector<std::size_t>& frames;  // that weigh, of the window's
+  std::size_t points = 96;                 // of a posterior: its summary is computed from so many
 };
 
 /// All but the numbers of evaluations before, and remarks of the search.

@@ -33,18 +33,14 @@ void put(core::Result<Value> result, belief::Answer& answer) {
 template <class Task>
 auto within_time(const belief::Effort& effort, const QueryContext& context, const Task& task) {
   if (!effort.max_seconds || effort.exact_instances) return task(context);
-  const auto after = [start = core::Cancellation::Clock::now()](double seconds) {
-    return start +
-           std::chrono::duration_cast<core::Cancellation::Clock::duration>(std::chrono::duration<double>(seconds));
-  };
   const core::Cancellation never;
-  const auto end = after(*effort.max_seconds + kEndAfter);
+  const auto end = deadline_after(*effort.max_seconds + kEndAfter);
   const core::Cancellation cancelled(context.cancellation ? *context.cancellation : never, end);
   const core::Cancellation abandoned(context.abandoned ? *context.abandoned : never, end);
   QueryContext limited = context;
   limited.cancellation = &cancelled;
   limited.abandoned = &abandoned;
-  const auto cut = after(*effort.max_seconds + kCutAfter);
+  const auto cut = deadline_after(*effort.max_seconds + kCutAfter);
   limited.simulate_until = std::min(context.simulate_until.value_or(cut), cut);
   return task(limited);
 }
@@ -84,6 +80,11 @@ void dispatch(const Known& known, const belief::Query& query, const QueryContext
 }
 
 }  // namespace
+
+core::Cancellation::Clock::time_point deadline_after(double seconds) {
+  return core::Cancellation::Clock::now() +
+         std::chrono::duration_cast<core::Cancellation::Clock::duration>(std::chrono::duration<double>(seconds));
+}
 
 belief::Answer answer(const belief::Belief& snapshot, const belief::Query& query, const QueryContext& context) {
   PRESCENE_CHECK(snapshot.scene != nullptr);

@@ -133,14 +133,16 @@ class TemperedSampler {
     begin();
     for (int step = 1;; ++step) {
       if (cancellation && cancellation->requested()) break;
+      const bool late = options_.out_of_time && options_.out_of_time();
       bool any = false;
       // Each run goes its own way, so that it does not depend on those beside it.
       for (std::size_t r = 0; r < runs_.size(); ++r) {
         Run& run = runs_[r];
         run.moves = true;
         if (run.b < 1.0 && !run.gave_up) {
-          temper(run, step >= options_.most_steps,
-                 stream_.at(2 * static_cast<std::uint64_t>(step), static_cast<std::uint32_t>(number_of(r))));
+          const auto stream =
+              stream_.at(2 * static_cast<std::uint64_t>(step), static_cast<std::uint32_t>(number_of(r)));
+          if (temper(run, late || step >= options_.most_steps, stream)) (late ? unfinished_ : cut_short_) = true;
           run.moves = !run.gave_up;
         } else if (!run.gave_up && run.last_moves < options_.last_moves) {
           ++run.last_moves;
@@ -150,7 +152,7 @@ class TemperedSampler {
         }
         any = any || run.moves;
       }
-      if (!any) break;
+      if (!any || late) break;
       if (target_.dimensions > 0) move(static_cast<std::uint64_t>(step));
     }
     return result();
@@ -216,8 +218,9 @@ class TemperedSampler {
     }
   }
 
-  /// The largest step of b that leaves enough effective points; resamples.
-  void temper(Run& run, bool last, core::RandomStream stream) {
+  /// The largest step of b that leaves enough effective points, but for the last, which goes to 1; resamples. Whether
+  /// it was too large.
+  bool temper(Run& run, bool last, core::RandomStream stream) {
     const std::size_t n = run.z.size();
     std::vector<double> gain(n), weight(n);
     for (std::size_t i = 0; i < n; ++i) gain[i] = log_gain(run, i);
@@ -237,10 +240,8 @@ class TemperedSampler {
       double low = 0.0, high = step;
       for (int k = 0; k < 40; ++k) (effective(0.5 * (low + high)) < wanted ? high : low) = 0.5 * (low + high);
       step = std::max(low, 1e-6);
-    } else if (effective(step) < wanted) {
-      cut_short_ = true;
     }
-    effective(step);
+    const bool too_large = effective(step) < wanted && last;
     double sum = 0.0;
     for (const double w : weight) sum += w;
     run.log_evidence += step * top + std::log(sum / static_cast<double>(n));
@@ -253,7 +254,7 @@ class TemperedSampler {
       run.gave_up = true;
       run.z.resize(static_cast<std::size_t>(options_.points));
       run.log_l.resize(run.z.size());
-      return;
+      return false;
     }
     for (double& w : weight) w /= sum;
     measure(run, weight);
@@ -271,6 +272,7 @@ class TemperedSampler {
     }
     run.z = std::move(z);
     run.log_l = std::move(log_l);
+    return too_large;
   }
 
   /// The spread of the moved coordinates, along which random walks go.
@@ -327,6 +329,7 @@ class TemperedSampler {
     TemperedResult result;
     result.evaluations = evaluations_;
     result.cut_short = cut_short_;
+    result.unfinished = unfinished_;
     std::vector<std::size_t> run_of;
     for (std::size_t r = 0; r < runs_.size(); ++r) {
       const Run& run = runs_[r];
@@ -347,7 +350,7 @@ class TemperedSampler {
   std::size_t moved_;
   std::vector<Run> runs_;
   int evaluations_ = 0;
-  bool cut_short_ = false;
+  bool cut_short_ = false, unfinished_ = false;
 };
 
 }  // namespace
@@ -379,6 +382,7 @@ TemperedResult merge(const TemperedResult& a, const TemperedResult& b) {
   both.evaluations = a.evaluations + b.evaluations;
   both.cut_short = a.cut_short || b.cut_short;
   both.gave_up = a.gave_up || b.gave_up;
+  both.unfinished = a.unfinished || b.unfinished;
   std::vector<std::size_t> run_of;
   for (const TemperedResult* one : {&a, &b}) {
     const std::size_t points = one->points.size() / one->log_evidence.size(), first = both.log_evidence.size();

@@ -112,7 +112,11 @@ void weigh_events(std::vector<Judged>& nothings, std::vector<Judged>& judged, do
     std::vector<double> varied = log_posterior;
     // An estimate without bias is so many times too large with a probability of at most one over that (Markov), however
     // much its runs scatter.
-    for (std::size_t i = 0; i <= n; ++i) varied[i] += std::max(student(errors[i]), std::log(tail));
+    // What was not searched to its end may have any evidence between what was found and the most that can be.
+    for (std::size_t i = 0; i <= n; ++i) {
+      const auto& more = i < n ? judged[i].may_be_more : likeliest_nothing->may_be_more;
+      varied[i] += more ? *more * draws.uniform() : std::max(student(errors[i]), std::log(tail));
+    }
     const std::vector<double> sample = shares(varied);
     for (std::size_t i = 0; i <= n; ++i) drawn[i].push_back(sample[i]);
   }
@@ -125,7 +129,7 @@ void weigh_events(std::vector<Judged>& nothings, std::vector<Judged>& judged, do
     double mean_share = 0.0;
     for (const double share : drawn[i]) mean_share += share / kPosteriorDraws;
     one.probability = mean_share;
-    one.low = one.posterior.gave_up ? 0.0 : std::min(mean_share, at(tail));
+    one.low = one.posterior.gave_up || one.may_be_more ? 0.0 : std::min(mean_share, at(tail));
     one.high = std::max(mean_share, at(1.0 - tail));
   };
   for (std::size_t i = 0; i < n; ++i) put(i, judged[i]);

@@ -233,6 +233,10 @@ Verb add_explain_verb(CLI::App& app) {
                    "Of the probabilities' intervals: good enough to stop searching")
       ->check(number_between(0.001, 0.5))
       ->capture_default_str();
+  verb->add_option("--max-seconds", options->explain.max_seconds,
+                   "Wall time, s, after which no search goes on; the answer then depends on the machine's speed, and "
+                   "what there was no time for is said")
+      ->check(number_between(0.0, 1e6));
   add_input_options(*verb, options->depth_scale, options->frame_rate, options->explain.read);
   add_topic_options(*verb, options->tracker);
   add_camera_options(*verb, options->tracker.assembler);

@@ -95,6 +95,7 @@ core::Status explain_into(const EventEpisode& episode, std::uint64_t seed, const
   explain.to = episode.to;
   explain.query = options.query;
   explain.query.seed = seed;
+  explain.max_seconds = options.max_seconds;
   const auto explained = explain_recording(input, explain, {}, seed, backends, cancellation, {});
   std::error_code ignored;
   std::filesystem::remove(path, ignored);
@@ -111,6 +112,7 @@ core::Status explain_into(const EventEpisode& episode, std::uint64_t seed, const
   result.low = first.low;
   result.high = first.high;
   result.explaining = explained->cpu_seconds;
+  result.cut_short = explained->answer.cut_short;
   result.right = is_true(first);
   const auto is_touch = [](EventKind kind) { return kind == EventKind::kPushed || kind == EventKind::kBumped; };
   const bool touched = is_touch(first.kind) && is_touch(episode.truth) && first.object == episode.object;

@@ -23,11 +23,6 @@ constexpr std::size_t kMostRefusalsWaiting = 256;
 // s between the last simulated instance and the end of all work on a question, at most.
 constexpr double kRestSeconds = 1.5;
 
-core::Cancellation::Clock::time_point deadline_after(double seconds) {
-  return core::Cancellation::Clock::now() +
-         std::chrono::duration_cast<core::Cancellation::Clock::duration>(std::chrono::duration<double>(seconds));
-}
-
 /// Questions without limits of their own are bounded in time, so that a robot gets its answer.
 void bound_effort(belief::Query& query, double default_seconds, double most_seconds) {
   const auto bound = [=](belief::Effort& effort) {
@@ -255,9 +250,9 @@ void QueryWorker::answer(const Question& question) {
 QueryWorker::Reply QueryWorker::reply_to(const Question& question) {
   queries::QueryContext context = backends_.query_context(pool_);
   const double most_seconds = most_seconds_;
-  const core::Cancellation end(stop_, deadline_after(most_seconds + kRestSeconds));
+  const core::Cancellation end(stop_, queries::deadline_after(most_seconds + kRestSeconds));
   context.cancellation = context.abandoned = &end;
-  context.simulate_until = deadline_after(most_seconds);
+  context.simulate_until = queries::deadline_after(most_seconds);
   context.most_bytes = settings_.most_bytes;
   context.timeline = settings_.timeline;
   return std::visit([&](const auto& one) { return reply_to(one, context); }, question);
@@ -281,7 +276,7 @@ QueryWorker::Reply QueryWorker::reply_to(const belief::ExplainQuestion& question
     return {error_answer(question.id, core::unavailable("frames are not kept here, so that nothing can be explained")),
             false};
   if (question.max_seconds)
-    context.simulate_until = std::min(*context.simulate_until, deadline_after(*question.max_seconds));
+    context.simulate_until = std::min(*context.simulate_until, queries::deadline_after(*question.max_seconds));
   const auto document = settings_.explain(question, context);
   if (document) return {belief::json_text(*document), true};
   // Nobody else stops it: its time was over in the middle of a search.

@@ -170,6 +170,7 @@ core::Result<Explained> explain_recording(const ReplayInput& input, const Explai
   context.settings = settings.filter;
   const core::Stopwatch watch;
   const double cpu = core::process_cpu_seconds();
+  if (options.max_seconds) context.simulation.simulate_until = queries::deadline_after(*options.max_seconds);
   PRESCENE_TRY(explained.answer, queries::explain(window, query, context));
   explained.seconds = watch.seconds();
   explained.cpu_seconds = core::process_cpu_seconds() - cpu;

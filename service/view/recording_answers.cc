@@ -23,11 +23,6 @@ std::size_t bytes_of(const belief::Belief& belief) {
   return bytes;
 }
 
-core::Cancellation::Clock::time_point after(double seconds) {
-  return core::Cancellation::Clock::now() +
-         std::chrono::duration_cast<core::Cancellation::Clock::duration>(std::chrono::duration<double>(seconds));
-}
-
 void bound_seconds(belief::Effort& effort, const RecordingViewOptions& options) {
   if (!effort.exact_instances)
     effort.max_seconds = std::min(effort.max_seconds.value_or(options.question_seconds), options.most_question_seconds);
@@ -106,9 +101,9 @@ std::string RecordingAnswers::answer_to(const Waiting& waiting) {
   if (auto* predict = std::get_if<belief::PredictQuery>(&query->what)) bound_seconds(predict->effort, options_);
   if (auto* stability = std::get_if<belief::StabilityQuery>(&query->what)) bound_seconds(stability->effort, options_);
   queries::QueryContext context = backends_.query_context(backends_.pool());
-  const core::Cancellation end(stop_, after(options_.most_question_seconds + kRestSeconds));
+  const core::Cancellation end(stop_, queries::deadline_after(options_.most_question_seconds + kRestSeconds));
   context.cancellation = context.abandoned = &end;
-  context.simulate_until = after(options_.most_question_seconds);
+  context.simulate_until = queries::deadline_after(options_.most_question_seconds);
   context.most_bytes = kMostQueryBytes;
   return belief::json_text(belief::to_json(queries::answer(*waiting.belief, *query, context)));
 }

@@ -139,6 +139,35 @@ TEST(TemperedPosterior, GivesUpWhatCannotReachTheWantedEvidence) {
   EXPECT_EQ(again.log_evidence, searched.log_evidence);
 }
 
+// The rest of the path is one step then: the evidence is without bias, and the result says that it is unfinished.
+TEST(TemperedPosterior, EndsWhenTheTimeIsOut) {
+  TemperedTarget target;
+  target.dimensions = target.moved = 1;
+  int calls = 0;
+  target.evaluate = [&](std::span<const LatentPoint> points, std::span<double> log_likelihoods) {
+    ++calls;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      log_likelihoods[i] = -200.0 * (points[i][0] - 1.0) * (points[i][0] - 1.0);
+  };
+  const core::RandomStream stream(1, core::Purpose::kTest);
+  const TemperedResult searched = tempered_posterior(target, {}, stream);
+  EXPECT_FALSE(searched.unfinished);
+  const int all_calls = std::exchange(calls, 0);
+  TemperedOptions options;
+  options.runs = 512;
+  options.out_of_time = [&] { return calls >= 1; };
+  const TemperedResult in_one_step = tempered_posterior(target, options, stream);
+  EXPECT_EQ(calls, 1);
+  EXPECT_LT(calls, all_calls);
+  EXPECT_TRUE(in_one_step.unfinished);
+  EXPECT_FALSE(in_one_step.cut_short);
+  EXPECT_NEAR(in_one_step.mean_log_evidence, -0.5 * std::log(401.0) - 0.5 * 400.0 / 401.0, 0.1);
+  // Time enough changes no bit.
+  options = {};
+  options.out_of_time = [] { return false; };
+  EXPECT_EQ(tempered_posterior(target, options, stream).log_evidence, searched.log_evidence);
+}
+
 TEST(TemperedPosterior, OfAnImpossibleLikelihoodIsFinite) {
   TemperedTarget target;
   target.dimensions = target.moved = 1;

@@ -61,6 +61,29 @@ INSTANTIATE_TEST_SUITE_P(Kinds, ExplainedEpisodes,
                                          "exchanged"),
                          [](const auto& tested) { return tested.param; });
 
+// What there was no time for may be anything in its interval: that is an answer, and no event is ruled out by it.
+TEST(ExplainedEvents, WithoutTimeForASearchAnyEventMayBe) {
+  ExplainedEventsOptions options;
+  options.max_seconds = 0.0;
+  const prescene::tests::ScratchDir scratch;
+  const EpisodeResult result = explain_episode(make_event_episode("pushed", 1), 1, options, scratch.path(), {});
+  EXPECT_EQ(result.failure, "");
+  EXPECT_TRUE(result.cut_short);
+  EXPECT_EQ(result.low, 0.0);
+  EXPECT_GT(result.high, 0.9);
+  EXPECT_GT(result.of_truth, 0.05);
+}
+
+TEST(ExplainedEvents, AreSearchedToTheirEndThoughNoOtherMotionIsProbable) {
+  EventEpisode episode = make_event_episode("pushed", 1);
+  episode.known += "\nevents: {other: 0}\n";
+  const prescene::tests::ScratchDir scratch;
+  const EpisodeResult result = explain_episode(episode, 1, {}, scratch.path(), {});
+  EXPECT_EQ(result.failure, "");
+  EXPECT_TRUE(result.nearly_right) << result.first << " " << result.probability << ", truth " << result.of_truth;
+  EXPECT_GT(result.of_truth, 0.1);
+}
+
 // Where they bounce to is not known, which no share of their way says.
 TEST(ExplainedEvents, WhatFellOutOfSightMayHaveBouncedAnywhere) {
   const prescene::tests::ScratchDir scratch;

@@ -63,6 +63,9 @@ struct QueryContext {
 /// else ends after the second; what had to be left out is named in the remarks.
 inline constexpr double kCutAfter = 0.6, kEndAfter = 1.5;
 
+/// So many seconds from now, for QueryContext::simulate_until and cancellations.
+core::Cancellation::Clock::time_point deadline_after(double seconds);
+
 /// Answers from a snapshot. Objects that are lost or probably not there (existence below 1/2) take no part. The same
 /// snapshot and query give the same answer (wall times aside), unless time ran out: then the answer's number of
 /// instances, given as Effort::exact_instances, gives it again. What can't be answered has its reason in Answer::error.

@@ -43,6 +43,8 @@ struct TemperedOptions {
   /// A run ends when its log evidence can't reach this any more, because no point is likelier than `most_likely`.
   double give_up_below = -std::numeric_limits<double>::infinity();
   double most_likely = std::numeric_limits<double>::infinity();  ///< Upper bound of log L.
+  /// Asked between moves; from when it says so, runs end with one step of b, whatever it costs. Empty = never.
+  std::function<bool()> out_of_time;
 };
 
 struct TemperedPoint {
@@ -53,12 +55,15 @@ struct TemperedPoint {
 
 struct TemperedResult {
   std::vector<TemperedPoint> points;
-  std::vector<double> log_evidence;  ///< Of each run; an upper bound where it gave up.
-  double mean_log_evidence = 0.0;    ///< log of the mean of the runs' evidence.
-  double error = 0.0;                ///< Standard error of that.
-  int evaluations = 0;               ///< Of the likelihood.
-  bool cut_short = false;            ///< The last step of b was larger than the effective sample size allows.
-  bool gave_up = false;              ///< A run did.
+  /// Of each run. An upper bound where it gave up. Where it is unfinished, the rest of b was one step: without bias,
+  /// too, but mostly too small.
+  std::vector<double> log_evidence;
+  double mean_log_evidence = 0.0;  ///< log of the mean of the runs' evidence.
+  double error = 0.0;              ///< Standard error of that.
+  int evaluations = 0;             ///< Of the likelihood.
+  bool cut_short = false;          ///< The last step of b was larger than the effective sample size allows.
+  bool gave_up = false;            ///< A run did.
+  bool unfinished = false;         ///< The time ran out before all runs were at b = 1.
 };
 
 /// Sets where `found`, of the same target, has the posterior, somewhat wider. Runs that are proposed from there need

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,10 +19,11 @@
 namespace prescene::service {
 
 struct ExplainedEventsOptions {
-  int episodes = 330;              ///< The kinds in turn.
-  std::vector<std::string> kinds;  ///< Only these; empty = all.
-  double rate = 15.0;              ///< Simulated frames a second.
-  queries::ExplainQuery query;     ///< Its seed is that of the episode.
+  int episodes = 330;                 ///< The kinds in turn.
+  std::vector<std::string> kinds;     ///< Only these; empty = all.
+  double rate = 15.0;                 ///< Simulated frames a second.
+  queries::ExplainQuery query;        ///< Its seed is that of the episode.
+  std::optional<double> max_seconds;  ///< For each, as ExplainOptions.
 };
 
 /// One of the explanations of an episode.
@@ -49,6 +51,7 @@ struct EpisodeResult {
   double place_radius = 0.0;         ///< m, the stated 90 % radius.
   bool place_within = false;         ///< The error is within that.
   bool hidden = false;               ///< It is truly out of sight there.
+  bool cut_short = false;            ///< The time ran out.
   double seconds = 0.0;              ///< CPU time of tracking and explanation ...
   double explaining = 0.0;           ///< ... and of the explanation alone.
 };

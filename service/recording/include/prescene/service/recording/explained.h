@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,9 @@ struct ExplainOptions {
   double to = 0.0;             ///< The same; the last frame that is looked at is not after it.
   RecordingReadOptions read;
   queries::ExplainQuery query;  ///< Its weights are those of the scene's `events`, whatever is given.
+  /// s, wall time after which no search goes on, without the replay; empty = no limit. The answer then depends on the
+  /// machine's speed.
+  std::optional<double> max_seconds;
 };
 
 struct Explained {
