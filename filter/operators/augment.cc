@@ -7,6 +7,7 @@
 
 #include "hidden_places.h"
 #include "particle_update.h"
+#include "prescene/filter/operators/standing.h"
 #include "prescene/filter/operators/track_state.h"
 #include "prescene/filter/operators/unknown_objects.h"
 #include "prescene/filter/proposals/fine_frame.h"
@@ -162,10 +163,15 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   if (e.log_ratio < current.log_ratio + options.min_gain || shown < kLeastShown) return false;
   // Of a tracked object, the particles know that place better than a search of one frame.
   const double distance = (found.X_CO * target.centre() - X_CO * target.centre()).norm();
-  if (object.state == belief::TrackState::kTracked &&
-      (is_same_place(found.X_CO, X_CO, target) || e.tempered - current.tempered < log_odds_against_jump(distance)))
-    return false;
   const Pose X_WO = frame.X_WC * found.X_CO;
+  if (object.state == belief::TrackState::kTracked) {
+    const auto log_of = [&](const rendering::PoseEvidence& evidence, const Pose& at) {
+      return evidence.tempered + log_sunk(*target.mesh, *frame.surfaces, frame.up_W, at);
+    };
+    if (is_same_place(found.X_CO, X_CO, target) ||
+        log_of(e, X_WO) - log_of(current, last.X_WO) < log_odds_against_jump(distance))
+      return false;
+  }
   // A support that is a little higher than the scene says looks like the top of something inside it.
   if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > kMostOverlap) return false;
   // So does an arm that is not quite where it is said to be. But a hand of a coarse shape may hold a thing within it.

@@ -87,12 +87,19 @@ int propose_rivals(const FilterFrame& frame, const rendering::FrameTerms& terms,
              (particle.X_WO * target.centre() - rival.X_WO * target.centre()).norm() < kHeldShift;
     });
   });
+  if (rivals.empty()) return 0;
+  // How high a find is above its support is not known to millimetres.
+  if (!is_found) {
+    const double sunk = log_sunk(*target.mesh, *frame.surfaces, frame.up_W, best.X_WO);
+    for (Rival& rival : rivals)
+      rival.log_odds += std::min(0.0, log_sunk(*target.mesh, *frame.surfaces, frame.up_W, rival.X_WO) - sunk);
+  }
   if (best.mode == belief::MotionMode::kResting) {
     const std::shared_ptr<const RestingShape> shape = tools.meshes->resting_shape(*target.mesh);
-    for (Rival& rival : rivals)
-      rival.log_odds += log_standing_odds(*shape, *frame.surfaces, frame.up_W, *target.mesh, rival.X_WO, best.X_WO);
-    std::erase_if(rivals, [&](const Rival& rival) { return rival.log_odds < least; });
+    const StandingOdds odds(*shape, *target.mesh, *frame.surfaces, frame.up_W, best.X_WO);
+    for (Rival& rival : rivals) rival.log_odds += odds.log_of(rival.X_WO);
   }
+  std::erase_if(rivals, [&](const Rival& rival) { return rival.log_odds < least; });
   if (rivals.empty()) return 0;
   std::vector<Particle>& particles = object.particles;
   double log_best = -std::numeric_limits<double>::infinity();

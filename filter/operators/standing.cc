@@ -33,6 +33,7 @@ constexpr double kMostOffset = 0.02;         // m; what is further from a suppor
 constexpr std::size_t kFewestPixels = 8;     // that show a support
 constexpr double kOfMedian = 1.86;           // error of a median by the median of deviations, of normal noise
 constexpr double kCalibration = 0.005;       // m, standard deviation of where a scene says that a support is
+constexpr double kDeepest = 0.05;            // m; what lies deeper in a support is not looked for
 
 /// The support below the object's middle, as far as it may carry it.
 std::optional<SupportSurfaces::Hit> support_below(const rendering::RenderMesh& mesh, const SupportSurfaces& supports,
@@ -211,13 +212,30 @@ std::optional<PoseEquations> standing_equations(
   return stands;
 }
 
-double log_standing_odds(const RestingShape& shape, const SupportSurfaces& supports, const Vector3d& up_W,
-                         const rendering::RenderMesh& mesh, const Pose& X_WO, const Pose& other_X_WO) {
-  const auto mine = support_below(mesh, supports, up_W, X_WO);
-  const auto others = support_below(mesh, supports, up_W, other_X_WO);
-  if (!mine || !others) return 0.0;
-  return std::min(0.0, log_standing(shape, X_WO.rotation.conjugate() * mine->normal_W) -
-                           log_standing(shape, other_X_WO.rotation.conjugate() * others->normal_W));
+double log_sunk(const rendering::RenderMesh& mesh, const SupportSurfaces& supports, const Vector3d& up_W,
+                const Pose& X_WO) {
+  const Eigen::Vector3f up_O = (X_WO.rotation.conjugate() * up_W).cast<float>();
+  const auto lowest = std::min_element(mesh.vertices.begin(), mesh.vertices.end(),
+                                       [&](const auto& a, const auto& b) { return up_O.dot(a) < up_O.dot(b); });
+  if (lowest == mesh.vertices.end()) return 0.0;
+  const auto hit = supports.first_along(X_WO * lowest->cast<double>() + kDeepest * up_W, -up_W, kDeepest);
+  const double depth = hit ? (kDeepest - hit->distance) / kCalibration : 0.0;
+  return -0.5 * depth * depth;
+}
+
+StandingOdds::StandingOdds(const RestingShape& shape, const rendering::RenderMesh& mesh,
+                           const SupportSurfaces& supports, const Vector3d& up_W, const Pose& followed_X_WO)
+    : shape_(shape), mesh_(mesh), supports_(supports), up_W_(up_W), followed_(log_standing_at(followed_X_WO)) {}
+
+double StandingOdds::log_of(const Pose& X_WO) const {
+  const auto turned = followed_ ? log_standing_at(X_WO) : std::nullopt;
+  return turned ? std::min(0.0, *turned - *followed_) : 0.0;
+}
+
+std::optional<double> StandingOdds::log_standing_at(const Pose& X_WO) const {
+  const auto below = support_below(mesh_, supports_, up_W_, X_WO);
+  if (!below) return std::nullopt;
+  return log_standing(shape_, X_WO.rotation.conjugate() * below->normal_W);
 }
 
 }  // namespace prescene::filter

@@ -12,7 +12,7 @@
 namespace prescene::filter_tests {
 namespace {
 
-using filter::log_standing_odds;
+using filter::log_sunk;
 using filter::PoseEquations;
 using filter::resting_shape_of;
 using filter::RestingShape;
@@ -45,7 +45,7 @@ class StandingOnATable : public testing::Test {
     return standing_equations(shape_, *mesh_, surfaces(), Vector3d::UnitZ(), X_WO, believed_height, seen, 0.5);
   }
   double log_odds(const Pose& X_WO, const Pose& other) {
-    return log_standing_odds(shape_, surfaces(), Vector3d::UnitZ(), *mesh_, X_WO, other);
+    return filter::StandingOdds(shape_, *mesh_, surfaces(), Vector3d::UnitZ(), other).log_of(X_WO);
   }
 
   belief::Scene scene_;
@@ -180,6 +180,24 @@ TEST_F(StandingOnATable, ThingsStandOnTheFacesThatTheyComeToLieOn) {
   }
   // In the air nothing is said.
   EXPECT_EQ(log_odds({on_its_neck.rotation, {0.0, 0.0, 0.6}}, Pose::from_translation({0.0, 0.0, 0.4})), 0.0);
+}
+
+// By its lowest point alone, and only where that is in the support: what leans over an edge is not.
+TEST_F(StandingOnATable, WhatIsDeepInASupportIsImprobableThere) {
+  take(block());
+  const auto sunk = [&](const Pose& X_WO) { return log_sunk(*mesh_, surfaces(), Vector3d::UnitZ(), X_WO); };
+  for (const double x : {0.0, 0.1})
+    for (const double depth : {0.0, 0.005, 0.02})
+      EXPECT_NEAR(sunk(Pose::from_translation({x, 0.0, 0.09 - depth})), -0.5 * std::pow(depth / 0.005, 2), 0.01);
+  EXPECT_EQ(sunk(Pose::from_translation({0.0, 0.0, 0.3})), 0.0);
+  const Pose on_a_corner{geometry::exp_rotation({0.5, 0.4, 0.0}), Vector3d::Zero()};
+  double lowest = 0.0;
+  for (const auto& vertex : mesh_->vertices) lowest = std::min(lowest, (on_a_corner * vertex.cast<double>()).z());
+  EXPECT_NEAR(sunk({on_a_corner.rotation, {0.0, 0.0, -lowest - 0.01}}), -2.0, 0.01);
+  // Its lower corner is beside the table's edge.
+  const double edge = table().collision.empty() ? 0.0 : belief::collision_mesh(table().collision).vertices.front().x();
+  const Pose over_the_edge{geometry::exp_rotation({0.0, 0.6, 0.0}), {std::abs(edge) + 0.05, 0.0, 0.0}};
+  EXPECT_EQ(sunk(over_the_edge), 0.0);
 }
 
 // The scene's table is 6 mm higher than where the camera shows it.

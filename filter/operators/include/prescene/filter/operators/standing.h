@@ -45,10 +45,30 @@ std::optional<PoseEquations> standing_equations(
     const Pose& X_WO, const std::function<SupportHeight(const Vector3d& p_WB, const Vector3d& normal_W)>& height_at,
     const PoseEquations& seen, double common);
 
-/// nats, of resting turned as at X_WO against resting turned as at another pose, on the support that is near below
-/// their middles: about a face on which it stands there as often as it comes to lie on one like it, about any other
-/// rotation as often as things lean so. At most 0; 0 where no support is near.
-double log_standing_odds(const RestingShape& shape, const SupportSurfaces& supports, const Vector3d& up_W,
-                         const rendering::RenderMesh& mesh, const Pose& X_WO, const Pose& other_X_WO);
+/// nats, at most 0, of lying so deep in what carries it: the object's lowest point is below the surface there, which
+/// the scene is taken to know to 5 mm. 0 beside and above supports.
+double log_sunk(const rendering::RenderMesh& mesh, const SupportSurfaces& supports, const Vector3d& up_W,
+                const Pose& X_WO);
+
+/// Of an object that rests as it is followed, the odds that it rests turned otherwise.
+class StandingOdds {
+ public:
+  /// All but the pose must outlive it.
+  StandingOdds(const RestingShape& shape, const rendering::RenderMesh& mesh, const SupportSurfaces& supports,
+               const Vector3d& up_W, const Pose& followed_X_WO);
+  /// nats, on the support that is near below the middles of both: about a face on which it stands there as often as it
+  /// comes to lie on one like it, about any other rotation as often as things lean so. At most 0; 0 where no support is
+  /// near.
+  double log_of(const Pose& X_WO) const;
+
+ private:
+  std::optional<double> log_standing_at(const Pose& X_WO) const;
+
+  const RestingShape& shape_;
+  const rendering::RenderMesh& mesh_;
+  const SupportSurfaces& supports_;
+  Vector3d up_W_;
+  std::optional<double> followed_;
+};
 
 }  // namespace prescene::filter
