@@ -46,6 +46,7 @@ core::Result<std::vector<MotionForecast>> forecast_motions(
   for (std::size_t first = 0; first < motions.size(); first += kTogether) {
     const std::size_t count = std::min(kTogether, motions.size() - first);
     std::vector<belief::WorldState> starts;
+    std::vector<std::size_t> sliding;
     for (std::size_t i = first; i < first + count; ++i) {
       const RecordedMotion& motion = motions[i];
       PRESCENE_RETURN_IF_ERROR(check(motion));
@@ -62,9 +63,11 @@ core::Result<std::vector<MotionForecast>> forecast_motions(
         start.objects[0] =
             drawn_start(*begun, scatter, belief::physical_at(model, std::span(uniform).subspan(kStartDimensions)),
                         std::span(uniform).first(kStartDimensions));
+        if (motion.beginning == MotionBeginning::kSlide) sliding.push_back(starts.size());
         starts.push_back(std::move(start));
       }
     }
+    land(*simulator, sliding, kLanding, stream.at(numbers[first], 1), pool, starts, cancellation);
     std::vector<belief::Trajectory> runs(starts.size());
     simulator->run(starts, request, stream.at(numbers[first], 1), 0, pool, runs, cancellation);
     if (cancellation != nullptr && cancellation->requested())

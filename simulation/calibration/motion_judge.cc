@@ -107,10 +107,19 @@ core::Result<Eigen::MatrixXd> MotionJudge::simulated(const MotionHypothesis& hyp
   model.contact.edge_radius = hypothesis[MotionParameter::kEdgeRadius];
   PRESCENE_TRY(const std::unique_ptr<Simulator> simulator, make_simulator_(scene, 1.0));
   std::vector<belief::WorldState> starts;
-  for (std::size_t i = 0; i < cases_.size(); ++i) PRESCENE_RETURN_IF_ERROR(add_starts(i, hypothesis, &starts));
+  std::vector<std::size_t> sliding;
+  for (std::size_t i = 0; i < cases_.size(); ++i) {
+    PRESCENE_RETURN_IF_ERROR(add_starts(i, hypothesis, &starts));
+    if (cases_[i].slides)
+      for (std::size_t k = 0; k < samples(); ++k) sliding.push_back(i * samples() + k);
+  }
+  // Of the time between two checkpoints: slides are one ahead once they have landed.
+  const auto parts = static_cast<std::size_t>(std::ceil(checkpoint_step() / kLanding));
+  const double part = checkpoint_step() / static_cast<double>(parts);
+  land(*simulator, sliding, part, stream_, pool_, starts, cancellation_);
   RunRequest request;
   request.stop.duration = options_.checkpoints * checkpoint_step();
-  request.sample_interval = checkpoint_step();
+  request.sample_interval = part;
   std::vector<belief::Trajectory> runs(starts.size());
   simulator->run(starts, request, stream_, 0, pool_, runs, cancellation_);
   if (cancellation_ != nullptr && cancellation_->requested()) return core::cancelled("the calibration was stopped");
@@ -123,7 +132,8 @@ core::Result<Eigen::MatrixXd> MotionJudge::simulated(const MotionHypothesis& hyp
       for (std::size_t k = 0; k < samples(); ++k) {
         const std::vector<belief::WorldState>& states = runs[i * samples() + k].states;
         // What came to rest before stays there.
-        const belief::WorldState& state = states[std::min(j + 1, states.size() - 1)];
+        const std::size_t at = parts * (j + 1) - (cases_[i].slides ? 1 : 0);
+        const belief::WorldState& state = states[std::min(at, states.size() - 1)];
         points.col(view * options_.samples + static_cast<Eigen::Index>(k)) =
             point_of(state.objects[0].X_WO, center, gyration_);
       }

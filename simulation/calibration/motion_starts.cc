@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <vector>
 
 #include "prescene/core/random.h"
 #include "prescene/geometry/dense_solvers.h"
@@ -68,6 +69,28 @@ belief::ObjectState drawn_start(const MotionStart& start, const ThrowScatter& sc
   object.physical.friction *= factor;
   object.physical.impact_friction *= factor;
   return object;
+}
+
+void land(const Simulator& simulator, std::span<const std::size_t> sliding, double seconds,
+          const core::RandomStream& stream, core::ThreadPool& pool, std::span<belief::WorldState> starts,
+          const core::Cancellation* cancellation) {
+  if (sliding.empty()) return;
+  std::vector<belief::WorldState> landing;
+  for (const std::size_t i : sliding) {
+    landing.push_back(starts[i]);
+    landing.back().objects[0].physical.restitution = 0.0;
+  }
+  RunRequest request;
+  request.stop.duration = seconds;
+  std::vector<belief::Trajectory> runs(landing.size());
+  simulator.run(landing, request, stream, 0, pool, runs, cancellation);
+  if (cancellation != nullptr && cancellation->requested()) return;
+  for (std::size_t k = 0; k < sliding.size(); ++k) {
+    const belief::ObjectState& landed = runs[k].final().objects[0];
+    belief::ObjectState& start = starts[sliding[k]].objects[0];
+    start.X_WO = landed.X_WO;
+    start.V_WO = landed.V_WO;
+  }
 }
 
 }  // namespace prescene::simulation

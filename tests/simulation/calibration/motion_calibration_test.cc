@@ -63,9 +63,9 @@ class MotionCalibrationTest : public ::testing::Test {
     return simulated_tosses(scene, **make_simulator_(scene, 1.0), count, core::RandomStream(3, core::Purpose::kTest),
                             pool_, noise_);
   }
-  std::vector<SimulatedMotion> slides(const BoxTruth& truth, int count) {
+  std::vector<SimulatedMotion> slides(const BoxTruth& truth, int count, std::uint64_t seed = 3) {
     const belief::Scene scene = box_scene(truth);
-    return simulated_slides(scene, **make_simulator_(scene, 1.0), count, core::RandomStream(3, core::Purpose::kTest),
+    return simulated_slides(scene, **make_simulator_(scene, 1.0), count, core::RandomStream(seed, core::Purpose::kTest),
                             pool_, noise_);
   }
 
@@ -139,6 +139,23 @@ TEST_F(MotionCalibrationTest, SlidesTellFrictionAndNothingOfRestitution) {
   EXPECT_EQ(restitution.left_of_prior, 1.0);
   EXPECT_EQ(restitution.value, 0.2);
   EXPECT_EQ(restitution.standard_error, 0.2);
+}
+
+TEST_F(MotionCalibrationTest, NoiseOfSlidesTellsNothingOfRestitution) {
+  // Noise lifts starts off the board by 0.1 mm, and they bounce. Of these recordings, that took a tenth to a half of
+  // the prior.
+  MotionPrior prior = contact_prior();
+  prior[1] = {BoxTruth{}.impact_friction, 0.0};
+  for (const std::uint64_t seed : {2U, 4U, 16U, 29U}) {
+    const auto motions = begun(slides({}, 8, seed));
+    ASSERT_TRUE(motions.ok()) << motions.status().message();
+    const auto found = calibrated(*motions, prior, pool_);
+    ASSERT_TRUE(found.ok()) << found.status().message();
+    const CalibratedParameter& friction = found->parameters[0];
+    EXPECT_NEAR(friction.value, 0.22, 4.0 * friction.standard_error) << seed;
+    EXPECT_LT(friction.left_of_prior, 0.2) << seed;
+    EXPECT_EQ(found->parameters[1].left_of_prior, 1.0) << seed;
+  }
 }
 
 TEST_F(MotionCalibrationTest, EdgesThatNothingIsToldOfAreNotRoundedInside) {
