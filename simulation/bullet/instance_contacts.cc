@@ -6,6 +6,7 @@
 #include "instance_world.h"
 #include "prescene/belief/body_names.h"
 #include "prescene/simulation/rules/contact_rules.h"
+#include "prescene/simulation/rules/sphere_rules.h"
 
 namespace prescene::simulation {
 namespace {
@@ -130,8 +131,7 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
   const SurfaceCoefficients pair = pair_of(surface_of(a), surface_of(b));
   const std::uint64_t key = (static_cast<std::uint64_t>(a) << 48) | (static_cast<std::uint64_t>(b) << 32) |
                             (static_cast<std::uint64_t>(part_a & 0xffffu) << 16) | (part_b & 0xffffu);
-  // A contact moves on its bodies by what they slide in a step.
-  const double reach = ma.travel + mb.travel + kSameContact;
+  const std::size_t first = contacts_.size();
   for (const ContactPoint& point : points_) {
     SolverContact c;
     c.body_a = a;
@@ -147,19 +147,33 @@ void InstanceWorld::add_contacts(int a, int b, std::uint32_t part_a, std::uint32
     c.speed_before = point.normal.dot(ma.velocity_before + ma.spin_before.cross(point.position - ma.p_WCm) -
                                       mb.velocity_before - mb.spin_before.cross(point.position - mb.p_WCm)) +
                      point.turning;
-    const Vector3d p_B = mb.X_WO.inverse_times(point.position);
-    double nearest = reach * reach;
-    for (const Warm& warm : warm_) {
-      if (warm.key != key) continue;
-      const double distance = (warm.position - p_B).squaredNorm();
-      if (distance >= nearest) continue;
-      nearest = distance;
-      // A guess, never more than it was: an impact that something at rest bore was as much in a part of a step.
-      c.impulse = share() * warm.impulse;
-      c.friction_impulse = share() * warm.friction_impulse;
-    }
     contacts_.push_back(c);
     contact_keys_.push_back(key);
+  }
+  // A contact moves on its bodies by what they slide in a step.
+  inherit(first, key, ma.travel + mb.travel + kSameContact);
+}
+
+/// Impulses of the step before, to the contacts from `first` on. Each goes to the one that is nearest to where it acted
+/// among those that bear (kBearing), and to no other: what bore is borne once.
+void InstanceWorld::inherit(std::size_t first, std::uint64_t key, double reach) {
+  const Frame& X_WB = moving_[static_cast<std::size_t>(contacts_[first].body_b)].X_WO;
+  for (const Warm& warm : warm_) {
+    if (warm.key != key) continue;
+    const Vector3d position = X_WB * warm.position;
+    std::size_t heir = contacts_.size();
+    double nearest = reach * reach;
+    for (std::size_t i = first; i < contacts_.size(); ++i) {
+      const SolverContact& c = contacts_[i];
+      const double distance = (c.position - position).squaredNorm();
+      if (distance >= nearest || c.gap + part_ * std::min(0.0, c.speed_before) > kBearing) continue;
+      nearest = distance;
+      heir = i;
+    }
+    if (heir == contacts_.size()) continue;
+    // A guess, never more than it was: an impact that something at rest bore was as much in a part of a step.
+    contacts_[heir].impulse += share() * warm.impulse;
+    contacts_[heir].friction_impulse += share() * warm.friction_impulse;
   }
 }
 

@@ -189,6 +189,7 @@ class InstanceWorld {
   void find_pair(int a, int b);
   void find_parts(const Part& part_a, const Moving& ma, const Part& part_b, const Moving& mb, double range);
   void add_contacts(int a, int b, std::uint32_t part_a, std::uint32_t part_b);
+  void inherit(std::size_t first, std::uint64_t key, double reach);
   double free_acceleration(const SolverContact& contact) const;
   bool solve(const core::Cancellation* cancellation);
   void integrate();

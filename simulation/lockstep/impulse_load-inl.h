@@ -189,6 +189,7 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
   }
   const V dt = set<V>(settings_.dt) * a.share;
   const V per_dt = set<V>(1.0 / settings_.dt) / a.share;
+  put(row, kAtEnd, gap + dt * hn::Min(zero, speed_before));
   const V half = set<V>(0.5);
   V acceleration = (speed - speed_before) * per_dt;
   if constexpr (kMany) {

@@ -18,6 +18,7 @@
 #include "lane_math-inl.h"
 #include "lane_state.h"
 #include "prescene/simulation/rules/contact_rules.h"
+#include "prescene/simulation/rules/sphere_rules.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace prescene::simulation::HWY_NAMESPACE {
@@ -51,11 +52,12 @@ enum Field : int {
   kSpin = 24,  // of the kinematic body, P: 3
   kPerRollingStep = 27,
   kUpward = 55,  // of the normal, with several objects
+  kAtEnd = 56,   // the gap where the step ends, if nothing changes what closes it
   kNormal = 28,  // direction 3, turn of the object 3, of the other one 3
   kTangent1 = 37,
   kTangent2 = 46,
 };
-static_assert(kTangent2 + 9 <= kUpward && kUpward < SolverScratch::kFields);
+static_assert(kTangent2 + 9 <= kUpward && kAtEnd < SolverScratch::kFields);
 
 struct Rates {
   Vec3<V> velocity, spin;
@@ -191,6 +193,7 @@ class ContactRows {
   }
 
  private:
+  void find_heirs(const RowGroup& group, int warm_count, V reach);
   /// The other parts of a row's contacts.
   struct Others {
     HWY_ALIGN Real velocity[3][kLaneMultiple], spin[3][kLaneMultiple], origin[3][kLaneMultiple];
@@ -223,6 +226,7 @@ class ContactRows {
   std::uint32_t supports_[kObjects][kLaneMultiple] = {};  // a bit for each object, and one for all that is none
   bool overlap_ = false;
   HWY_ALIGN Real warm_[kMaxContacts][8][kLaneMultiple];
+  HWY_ALIGN Real heirs_[kMaxContacts][kLaneMultiple];  // of each of these: a row, or -1
 };
 
 template <bool kMany>
@@ -300,6 +304,28 @@ void ContactRows<kMany>::load(std::span<const std::int32_t> slots) {
   }
 }
 
+/// Each impulse of the step before goes to the contact that is nearest to where it acted among those that bear
+/// (kBearing), and to no other: what bore is borne once.
+template <bool kMany>
+void ContactRows<kMany>::find_heirs(const RowGroup& group, int warm_count, V reach) {
+  const D d;
+  for (int j = 0; j < warm_count; ++j) {
+    const Vec3<V> place{hn::Load(d, warm_[j][0]), hn::Load(d, warm_[j][1]), hn::Load(d, warm_[j][2])};
+    const V part = hn::Load(d, warm_[j][7]);
+    V heir = set<V>(-1.0);
+    V nearest = reach * reach;
+    for (int row = group.first; row < group.first + group.count; ++row) {
+      const Vec3<V> apart = place - get3(row, kPosition);
+      const V squared = dot(apart, apart);
+      const auto bears = hn::Le(get(row, kAtEnd), set<V>(kBearing));
+      const auto nearer = hn::And(hn::And(hn::Eq(get(row, kPart), part), bears), hn::Lt(squared, nearest));
+      nearest = select(nearer, squared, nearest);
+      heir = select(nearer, set<V>(static_cast<double>(row)), heir);
+    }
+    hn::Store(heir, d, heirs_[j]);
+  }
+}
+
 template <bool kMany>
 void ContactRows<kMany>::warm_start(Rates* changes) {
   const D d;
@@ -331,20 +357,16 @@ void ContactRows<kMany>::warm_start(Rates* changes) {
     if (kMany && group.b >= 0) reach = reach + object(group.b).travel;
     Rates& a = changes[group.a];
     Rates& b = changes[kMany && group.b >= 0 ? group.b : group.a];
+    find_heirs(group, warm_count, reach);
     for (int row = group.first; row < group.first + group.count; ++row) {
-      const V part = get(row, kPart);
-      const Vec3<V> position = get3(row, kPosition);
-      V nearest = reach * reach;
       V impulse = set<V>(0.0);
       Vec3<V> slip = set3<V>(0.0, 0.0, 0.0);
       for (int j = 0; j < warm_count; ++j) {
         const auto column = [&](std::size_t f) HWY_ATTR { return hn::Load(d, warm_[j][f]); };
-        const Vec3<V> apart = Vec3<V>{column(0), column(1), column(2)} - position;
-        const V squared = dot(apart, apart);
-        const auto nearer = hn::And(hn::Eq(part, column(7)), hn::Lt(squared, nearest));
-        nearest = select(nearer, squared, nearest);
-        impulse = select(nearer, column(3), impulse);
-        slip = select(nearer, Vec3<V>{column(4), column(5), column(6)}, slip);
+        const V counts =
+            hn::IfThenElseZero(hn::Eq(hn::Load(d, heirs_[j]), set<V>(static_cast<double>(row))), set<V>(1.0));
+        impulse = impulse + counts * column(3);
+        slip = slip + Vec3<V>{column(4), column(5), column(6)} * counts;
       }
       // A guess, never more than it was: an impact that something at rest bore was as much in a part of a step.
       impulse = impulse * object(group.a).share;

@@ -262,7 +262,7 @@ class SolverScratch {
   LaneContact** contacts(int row) { return contacts_.data() + static_cast<std::size_t>(row) * kLaneMultiple; }
   Real* kept(int slot) { return kept_.data() + static_cast<std::size_t>(slot) * kept_each_; }
   std::vector<std::int32_t>& unsettled(int round) { return unsettled_[static_cast<std::size_t>(round)]; }
-  static constexpr int kFields = 56;
+  static constexpr int kFields = 57;
 
  private:
   struct Free {

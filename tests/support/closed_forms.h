@@ -62,16 +62,23 @@ inline void expect_tipping_at_the_diagonal(simulation::Instance& instance, const
   EXPECT_NEAR(0.5 * (low + high), expected, tolerance) << width << " x " << height;
 }
 
+/// How each box of a stack stands on the one below: shifted by x, y (m) and turned (rad).
+struct StackOffset {
+  double x = 0.004, y = -0.003, turn = 0.1;
+};
+
 /// The scene's boxes of 10 cm stand on each other, each turned and shifted a little against the one below; they stay
-/// for ten seconds within `distance` (m) and `turn` (rad).
-inline void expect_stack_stays(simulation::Instance& instance, const Scene& scene, double distance, double turn) {
+/// for some seconds within `distance` (m) and `turn` (rad).
+inline void expect_stack_stays(simulation::Instance& instance, const Scene& scene, double distance, double turn,
+                               double seconds = 10.0, const StackOffset& offset = {}) {
   WorldState start = start_of(scene);
   for (std::size_t i = 0; i < start.objects.size(); ++i) {
     const auto n = static_cast<double>(i);
-    start.objects[i].X_WO = Pose{about(Vector3d::UnitZ(), 0.1 * n), {0.004 * n, -0.003 * n, 0.05 + 0.1 * n}};
+    start.objects[i].X_WO =
+        Pose{about(Vector3d::UnitZ(), offset.turn * n), {offset.x * n, offset.y * n, 0.05 + 0.1 * n}};
   }
   instance.set_state(start);
-  step_for(instance, 10.0);
+  step_for(instance, seconds);
   const WorldState end = instance.state();
   for (std::size_t i = 0; i < start.objects.size(); ++i) {
     EXPECT_LT((end.objects[i].X_WO.translation - start.objects[i].X_WO.translation).norm(), distance) << i;

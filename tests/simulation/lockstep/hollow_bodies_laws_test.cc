@@ -73,7 +73,7 @@ TEST(HollowBodies, StacksOfThreeStayForTenSeconds) {
                       : hollow_model(name, geometry::make_mesh(BoxShape{{0.1, 0.1, 0.1}})),
                name);
   }
-  expect_stack_stays(*lockstep_instance_of(scene), scene, 1e-3, 2e-3);
+  expect_stack_stays(*lockstep_instance_of(scene), scene, 2e-5, 1e-4);
 }
 
 TEST(HollowBodies, RollDownAnIncline) {
