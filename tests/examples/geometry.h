@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "prescene/geometry/camera.h"
@@ -17,6 +18,10 @@ extern const TriangleMesh mesh;
 namespace dense_solvers_h {
 extern const Eigen::MatrixXd covariance;
 }  // namespace dense_solvers_h
+
+namespace mesh_facts_h {
+extern const std::shared_ptr<const TriangleMesh> cup;
+}  // namespace mesh_facts_h
 
 namespace pixel_rays_h {
 extern const PinholeCamera camera;
