@@ -10,6 +10,7 @@
 #include "prescene/core/check.h"
 #include "prescene/core/hash.h"
 #include "prescene/core/parallel.h"
+#include "prescene/geometry/mesh_facts.h"
 
 namespace prescene::simulation {
 namespace {
@@ -122,21 +123,22 @@ core::Result<std::shared_ptr<const Value>> ShapeStore::find_or_build(Slots<Value
   return slot->value;
 }
 
-core::Result<std::shared_ptr<const ConvexParts>> ShapeStore::convex_parts(const TriangleMesh& mesh, belief::MeshUse use,
+core::Result<std::shared_ptr<const ConvexParts>> ShapeStore::convex_parts(const belief::MeshPtr& mesh,
+                                                                          belief::MeshUse use,
                                                                           const DecompositionSettings& settings) {
-  const Key key{geometry::content_hash(mesh), settings_hash(use, settings)};
-  return find_or_build(parts_, key, [&] { return build_parts(mesh, use, settings, decomposer_); });
+  const Key key{geometry::facts_of(mesh).content, settings_hash(use, settings)};
+  return find_or_build(parts_, key, [&] { return build_parts(*mesh, use, settings, decomposer_); });
 }
 
 core::Result<std::shared_ptr<const std::vector<RoundedPolytope>>> ShapeStore::rounded_parts(
-    const TriangleMesh& mesh, belief::MeshUse use, const DecompositionSettings& settings,
+    const belief::MeshPtr& mesh, belief::MeshUse use, const DecompositionSettings& settings,
     const std::vector<double>& radii, const PolytopeLimits& limits) {
   PRESCENE_TRY(const auto parts, convex_parts(mesh, use, settings));
   PRESCENE_CHECK(radii.size() == parts->size());
   core::Hasher hasher;
   hasher.value(settings_hash(use, settings)).value(limits.vertices).value(limits.corners);
   for (const double radius : radii) hasher.value(radius);
-  const Key key{geometry::content_hash(mesh), hasher.digest()};
+  const Key key{geometry::facts_of(mesh).content, hasher.digest()};
   return find_or_build(rounded_, key, [&]() -> core::Result<std::vector<RoundedPolytope>> {
     std::vector<RoundedPolytope> result;
     for (std::size_t i = 0; i < parts->size(); ++i) {
@@ -149,24 +151,30 @@ core::Result<std::shared_ptr<const std::vector<RoundedPolytope>>> ShapeStore::ro
 }
 
 core::Result<std::shared_ptr<const collision::SurfaceSpheres>> ShapeStore::surface_spheres(
-    const TriangleMesh& mesh, const belief::SphereSettings& settings) {
+    const belief::MeshPtr& mesh, const belief::SphereSettings& settings) {
   core::Hasher hasher;
   hasher.value(settings.count).value(settings.edge_fidelity);
-  const Key key{geometry::content_hash(mesh), hasher.digest()};
+  const Key key{geometry::facts_of(mesh).content, hasher.digest()};
   return find_or_build(spheres_, key, [&]() -> core::Result<collision::SurfaceSpheres> {
-    if (mesh.empty()) return core::invalid_input("the mesh has no triangle; check its file");
-    PRESCENE_TRY(const auto single, collision::Mesh::make(mesh, "of spheres"));
+    if (mesh->empty()) return core::invalid_input("the mesh has no triangle; check its file");
+    PRESCENE_TRY(const auto single, collision::Mesh::make(*mesh, "of spheres"));
     core::ThreadPool pool(1);
     return collision::cover_surface(single, {settings.count, settings.edge_fidelity}, pool);
   });
 }
 
-core::Result<std::shared_ptr<const StaticMesh>> ShapeStore::static_mesh(const TriangleMesh& mesh) {
-  const Key key{geometry::content_hash(mesh), 0};
+core::Result<std::shared_ptr<const StaticMesh>> ShapeStore::static_mesh(const belief::MeshPtr& mesh) {
+  const Key key{geometry::facts_of(mesh).content, 0};
   return find_or_build(meshes_, key, [&]() -> core::Result<StaticMesh> {
-    if (mesh.empty()) return core::invalid_input("the mesh has no triangle; check its file");
-    return build_static(mesh);
+    if (mesh->empty()) return core::invalid_input("the mesh has no triangle; check its file");
+    return build_static(*mesh);
   });
+}
+
+core::Result<ShapeStore::Made> ShapeStore::made(const belief::MeshPtr& mesh, std::uint64_t settings,
+                                                const std::function<core::Result<Made>()>& make) {
+  PRESCENE_TRY(const auto kept, find_or_build(made_, Key{geometry::facts_of(mesh).content, settings}, make));
+  return *kept;
 }
 
 std::size_t ShapeStore::built() const {

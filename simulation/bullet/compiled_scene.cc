@@ -8,6 +8,7 @@
 #include "prescene/collision/spheres/surface_spheres.h"
 #include "prescene/core/hash.h"
 #include "prescene/geometry/mass_properties.h"
+#include "prescene/geometry/mesh_facts.h"
 #include "prescene/simulation/rules/mechanics_hash.h"
 
 namespace prescene::simulation {
@@ -19,7 +20,7 @@ void set_bounds(Part& part, const Vector3d& low, const Vector3d& high) {
   part.box_half_size = part.X_OS.R.cwiseAbs() * (0.5 * (high - low));
 }
 
-Part convex_part(std::unique_ptr<ConvexCore> core, const Pose& X_OS) {
+Part convex_part(std::shared_ptr<const ConvexCore> core, const Pose& X_OS) {
   Part part;
   part.X_OS = Frame(X_OS);
   set_bounds(part, core->box_center() - core->box_half_size(), core->box_center() + core->box_half_size());
@@ -33,6 +34,38 @@ struct ShapeMaker {
   const BulletOptions& options;
   bool spheres = false;  // some object collides as spheres
 };
+
+using Cores = std::vector<std::shared_ptr<const ConvexCore>>;
+
+/// Of the convex parts of a mesh. Each simulator of a scene takes the same ones, as moving their faces inwards takes
+/// long.
+core::Result<std::shared_ptr<const Cores>> cores_of(const belief::MeshShape& mesh, double rounding,
+                                                    const ShapeMaker& maker) {
+  const DecompositionSettings& settings = maker.options.decomposition;
+  core::Hasher hasher;
+  hasher.text("cores").value(mesh.use).value(rounding);
+  hasher.value(settings.concavity).value(settings.min_parts).value(settings.max_part_vertices);
+  PRESCENE_TRY(const ShapeStore::Made made,
+               maker.shapes.made(mesh.mesh, hasher.digest(), [&]() -> core::Result<ShapeStore::Made> {
+                 PRESCENE_TRY(const auto parts, maker.shapes.convex_parts(mesh.mesh, mesh.use, settings));
+                 Cores cores;
+                 for (const ConvexPolytope& polytope : *parts)
+                   cores.push_back(ConvexCore::from_polytope(polytope, rounding));
+                 return ShapeStore::Made(std::make_shared<const Cores>(std::move(cores)));
+               }));
+  return std::static_pointer_cast<const Cores>(made);
+}
+
+core::Result<std::shared_ptr<const SurfaceShape>> surface_of(const belief::MeshShape& mesh, const ShapeMaker& maker) {
+  core::Hasher hasher;
+  hasher.text("surface").value(maker.spheres);
+  PRESCENE_TRY(const ShapeStore::Made made,
+               maker.shapes.made(mesh.mesh, hasher.digest(), [&]() -> core::Result<ShapeStore::Made> {
+                 PRESCENE_TRY(const auto prepared, maker.shapes.static_mesh(mesh.mesh));
+                 return ShapeStore::Made(std::make_shared<const SurfaceShape>(prepared, maker.spheres));
+               }));
+  return std::static_pointer_cast<const SurfaceShape>(made);
+}
 
 core::Status add_shape(const belief::CollisionShape& shape, bool fixed, double rounding, const ShapeMaker& maker,
                        CompiledBody& body) {
@@ -48,29 +81,26 @@ core::Status add_shape(const belief::CollisionShape& shape, bool fixed, double r
           "a triangle surface can only be fixed or a robot body; use convex_hull, convex_parts, decompose or spheres "
           "for objects");
     }
-    PRESCENE_TRY(const auto prepared, maker.shapes.static_mesh(*mesh.mesh));
     Part part;
+    PRESCENE_TRY(part.surface, surface_of(mesh, maker));
     part.X_OS = Frame(mesh.X_OS);
-    part.surface = std::make_shared<const SurfaceShape>(prepared, maker.spheres);
-    const geometry::Box box = geometry::bounding_box(*mesh.mesh);
+    const geometry::Box box = geometry::facts_of(mesh.mesh).box;
     set_bounds(part, box.min(), box.max());
     body.parts.push_back(std::move(part));
     return core::ok_status();
   }
   if (mesh.use == belief::MeshUse::kSpheres) {
     Part part;
-    PRESCENE_TRY(part.spheres, maker.shapes.surface_spheres(*mesh.mesh, mesh.spheres));
+    PRESCENE_TRY(part.spheres, maker.shapes.surface_spheres(mesh.mesh, mesh.spheres));
     part.X_OS = Frame(mesh.X_OS);
-    const geometry::Box box = geometry::bounding_box(*mesh.mesh);
+    const geometry::Box box = geometry::facts_of(mesh.mesh).box;
     const Vector3d rise = Vector3d::Constant(static_cast<double>(part.spheres->rise));
     set_bounds(part, box.min() - rise, box.max() + rise);
     body.parts.push_back(std::move(part));
     return core::ok_status();
   }
-  PRESCENE_TRY(const auto parts, maker.shapes.convex_parts(*mesh.mesh, mesh.use, maker.options.decomposition));
-  for (const ConvexPolytope& polytope : *parts) {
-    body.parts.push_back(convex_part(ConvexCore::from_polytope(polytope, rounding), mesh.X_OS));
-  }
+  PRESCENE_TRY(const auto cores, cores_of(mesh, rounding, maker));
+  for (const std::shared_ptr<const ConvexCore>& core : *cores) body.parts.push_back(convex_part(core, mesh.X_OS));
   return core::ok_status();
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lane_spheres.h"
+#include "prescene/geometry/mesh_facts.h"
 #include "prescene/simulation/rules/contact_rules.h"
 
 namespace prescene::simulation {
@@ -104,18 +105,18 @@ ConvexPart hull_part(const ConvexPolytope& hull, const RoundedPolytope& rounded,
   return part;
 }
 
-ConvexPart spheres_part(const geometry::TriangleMesh& mesh, const collision::SurfaceSpheres& spheres,
-                        const Placement& X) {
+ConvexPart spheres_part(const belief::MeshPtr& mesh, const collision::SurfaceSpheres& spheres, const Placement& X) {
   ConvexPart part;
   part.kind = CoreKind::kSpheres;
-  const geometry::Box box = geometry::bounding_box(mesh);
+  const geometry::MeshFacts facts = geometry::facts_of(mesh);
+  const geometry::Box& box = facts.box;
   const Vector3d middle = box.center();
   const double rise = spheres.rise;
   part.spheres = lanes_of(spheres, plain(middle));
   part.R_PS = plain(X.R);
   part.center = plain(Vector3d(X.R * middle + X.p));
   part.box_half = plain(Vector3d(X.R.cwiseAbs() * (0.5 * box.sizes() + Vector3d::Constant(rise))));
-  for (const Vector3d& v : mesh.vertices) part.ball = std::max(part.ball, (v - middle).norm() + rise);
+  part.ball = facts.radius + rise;
   return part;
 }
 
@@ -136,14 +137,14 @@ core::Status add_shape(const belief::CollisionShape& shape, const Pose& X_LB, do
     return core::unsupported("triangle surfaces are not simulated in lockstep");
   }
   if (mesh.use == belief::MeshUse::kSpheres) {
-    PRESCENE_TRY(const auto spheres, shapes.surface_spheres(*mesh.mesh, mesh.spheres));
-    parts.push_back(spheres_part(*mesh.mesh, *spheres, placed(mesh.X_OS)));
+    PRESCENE_TRY(const auto spheres, shapes.surface_spheres(mesh.mesh, mesh.spheres));
+    parts.push_back(spheres_part(mesh.mesh, *spheres, placed(mesh.X_OS)));
     return core::ok_status();
   }
-  PRESCENE_TRY(const auto hulls, shapes.convex_parts(*mesh.mesh, mesh.use, decomposition));
+  PRESCENE_TRY(const auto hulls, shapes.convex_parts(mesh.mesh, mesh.use, decomposition));
   std::vector<double> radii;
   for (const ConvexPolytope& hull : *hulls) radii.push_back(rounded_edge(rounding, hull.inner_radius()));
-  PRESCENE_TRY(const auto rounded, shapes.rounded_parts(*mesh.mesh, mesh.use, decomposition, radii, kLimits));
+  PRESCENE_TRY(const auto rounded, shapes.rounded_parts(mesh.mesh, mesh.use, decomposition, radii, kLimits));
   for (std::size_t i = 0; i < hulls->size(); ++i)
     parts.push_back(hull_part((*hulls)[i], (*rounded)[i], placed(mesh.X_OS)));
   return core::ok_status();

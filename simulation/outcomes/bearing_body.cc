@@ -93,7 +93,7 @@ std::optional<BearingBody> bearing_body(const std::vector<belief::CollisionShape
       vertices.insert(vertices.end(), more.begin(), more.end());
       continue;
     }
-    const auto spheres = store.surface_spheres(*mesh->mesh, mesh->spheres);
+    const auto spheres = store.surface_spheres(mesh->mesh, mesh->spheres);
     if (!spheres) return std::nullopt;
     append_patches(**spheres, mesh->X_OS, patches);
     body.rise = std::max(body.rise, static_cast<double>((*spheres)->rise));

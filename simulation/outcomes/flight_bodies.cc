@@ -36,7 +36,7 @@ core::Result<std::vector<TriangleMesh>> solids_of(const belief::CollisionShape& 
     solids.push_back(geometry::transformed(*mesh.mesh, mesh.X_OS));
     return solids;
   }
-  PRESCENE_TRY(const auto parts, shapes.convex_parts(*mesh.mesh, mesh.use, {}));
+  PRESCENE_TRY(const auto parts, shapes.convex_parts(mesh.mesh, mesh.use, {}));
   for (const ConvexPolytope& part : *parts) {
     PRESCENE_TRY(const TriangleMesh hull, geometry::convex_hull(part.vertices));
     solids.push_back(geometry::transformed(hull, mesh.X_OS));
@@ -47,7 +47,8 @@ core::Result<std::vector<TriangleMesh>> solids_of(const belief::CollisionShape& 
 /// The largest spheres that touch a surface from inside, grown by `margin` so that together they cover it.
 core::Result<std::shared_ptr<const collision::SphereTree>> covering(const TriangleMesh& solid, ShapeStore& shapes,
                                                                     double* margin) {
-  PRESCENE_TRY(const auto touching, shapes.surface_spheres(solid, {kSpheres, kEdgeFidelity}));
+  PRESCENE_TRY(const auto touching,
+               shapes.surface_spheres(std::make_shared<const TriangleMesh>(solid), {kSpheres, kEdgeFidelity}));
   std::vector<collision::PackedSphere> spheres;
   std::vector<collision::SurfaceAnchor> anchors;
   for (const collision::SurfacePatch& patch : touching->patches) {

@@ -2,6 +2,7 @@
 #include "prescene/simulation/rules/mechanics_hash.h"
 
 #include "prescene/core/hash.h"
+#include "prescene/geometry/mesh_facts.h"
 #include "prescene/simulation/rules/action_draws.h"
 
 namespace prescene::simulation {
@@ -41,7 +42,7 @@ class MechanicsHasher {
         continue;
       }
       const auto& mesh = std::get<belief::MeshShape>(shape);
-      if (mesh.mesh) value(geometry::content_hash(*mesh.mesh));
+      if (mesh.mesh) value(geometry::facts_of(mesh.mesh).content);
       pose(mesh.X_OS);
       value(mesh.use);
       value(mesh.spheres.count);

@@ -28,7 +28,7 @@ extern std::vector<belief::Trajectory> runs;
 }  // namespace own_actions_h
 
 namespace shape_store_h {
-extern const geometry::TriangleMesh mesh;
+extern const belief::MeshPtr mesh;
 extern const Decomposer decomposer;
 }  // namespace shape_store_h
 

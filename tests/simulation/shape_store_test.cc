@@ -19,6 +19,7 @@ using geometry::Vector3d;
 using simulation::ConvexPolytope;
 
 TriangleMesh box_mesh(const Vector3d& size) { return geometry::make_mesh(geometry::BoxShape{size}); }
+belief::MeshPtr shared(TriangleMesh mesh) { return std::make_shared<const TriangleMesh>(std::move(mesh)); }
 
 TEST(ConvexPolytopeOf, BoxHasSixFacesOfFourCorners) {
   const auto polytope = simulation::make_polytope(box_mesh({0.1, 0.2, 0.3}).vertices);
@@ -68,7 +69,7 @@ TEST(ShapeStore, MakesEachShapeOnceForAllThreads) {
     ++calls;
     return core::Result<std::vector<TriangleMesh>>(std::vector<TriangleMesh>{mesh});
   });
-  const TriangleMesh mesh = box_mesh({0.1, 0.1, 0.1});
+  const belief::MeshPtr mesh = shared(box_mesh({0.1, 0.1, 0.1}));
   std::vector<std::shared_ptr<const simulation::ConvexParts>> parts(8);
   std::vector<std::thread> threads;
   for (auto& part : parts) {
@@ -81,37 +82,50 @@ TEST(ShapeStore, MakesEachShapeOnceForAllThreads) {
   simulation::DecompositionSettings other;
   other.concavity = 0.05;
   EXPECT_NE(*store.convex_parts(mesh, belief::MeshUse::kDecompose, other), parts[0]);
-  EXPECT_NE(*store.convex_parts(box_mesh({0.1, 0.1, 0.2}), belief::MeshUse::kDecompose, {}), parts[0]);
+  EXPECT_NE(*store.convex_parts(shared(box_mesh({0.1, 0.1, 0.2})), belief::MeshUse::kDecompose, {}), parts[0]);
+}
+
+TEST(ShapeStore, KeepsWhatAStepperMakesOfAMesh) {
+  simulation::ShapeStore store;
+  const auto make = [] { return core::Result<simulation::ShapeStore::Made>(std::make_shared<const int>(7)); };
+  const auto first = *store.made(shared(box_mesh({0.1, 0.1, 0.1})), 1, make);
+  EXPECT_EQ(*std::static_pointer_cast<const int>(first), 7);
+  EXPECT_EQ(*store.made(shared(box_mesh({0.1, 0.1, 0.1})), 1, make), first);
+  EXPECT_NE(*store.made(shared(box_mesh({0.1, 0.1, 0.1})), 2, make), first);
+  EXPECT_NE(*store.made(shared(box_mesh({0.1, 0.1, 0.2})), 1, make), first);
+  EXPECT_EQ(store.built(), 3u);
+  const auto fails = [] { return core::Result<simulation::ShapeStore::Made>(core::unsupported("too thin")); };
+  EXPECT_EQ(store.made(shared(box_mesh({0.1, 0.1, 0.1})), 3, fails).status().message(), "too thin");
 }
 
 TEST(ShapeStore, ConvexPartsAreTheComponents) {
   simulation::ShapeStore store;
-  const TriangleMesh two = geometry::joined(
+  const belief::MeshPtr two = shared(geometry::joined(
       box_mesh({0.1, 0.1, 0.1}),
-      geometry::transformed(box_mesh({0.1, 0.1, 0.1}), geometry::Pose::from_translation({0.5, 0.0, 0.0})));
+      geometry::transformed(box_mesh({0.1, 0.1, 0.1}), geometry::Pose::from_translation({0.5, 0.0, 0.0}))));
   EXPECT_EQ((*store.convex_parts(two, belief::MeshUse::kConvexParts, {}))->size(), 2u);
   EXPECT_EQ((*store.convex_parts(two, belief::MeshUse::kConvexHull, {}))->size(), 1u);
 }
 
 TEST(ShapeStore, SaysWhatItCannotDo) {
   simulation::ShapeStore store;
-  const TriangleMesh mesh = box_mesh({0.1, 0.1, 0.1});
+  const belief::MeshPtr mesh = shared(box_mesh({0.1, 0.1, 0.1}));
   EXPECT_EQ(store.convex_parts(mesh, belief::MeshUse::kDecompose, {}).status().code(), core::StatusCode::kUnsupported);
   EXPECT_EQ(store.convex_parts(mesh, belief::MeshUse::kSurface, {}).status().code(), core::StatusCode::kUnsupported);
-  EXPECT_EQ(store.static_mesh(TriangleMesh{}).status().code(), core::StatusCode::kInvalidInput);
+  EXPECT_EQ(store.static_mesh(shared({})).status().code(), core::StatusCode::kInvalidInput);
 }
 
 TEST(StaticMesh, OnlyRidgesAndBordersCanBeFelt) {
   simulation::ShapeStore store;
   // All twelve edges of a box are ridges, the six diagonals are not.
-  const auto box = *store.static_mesh(box_mesh({0.1, 0.1, 0.1}));
+  const auto box = *store.static_mesh(shared(box_mesh({0.1, 0.1, 0.1})));
   int ridges = 0;
   for (const std::uint8_t bits : box->ridges) ridges += (bits & 1) + (bits >> 1 & 1) + (bits >> 2 & 1);
   EXPECT_EQ(ridges, 24);  // each from both sides
   // Turned inside out, all edges are valleys.
   TriangleMesh inside_out = box_mesh({0.1, 0.1, 0.1});
   for (auto& t : inside_out.triangles) std::swap(t[1], t[2]);
-  for (const std::uint8_t bits : (*store.static_mesh(inside_out))->ridges) EXPECT_EQ(bits, 0);
+  for (const std::uint8_t bits : (*store.static_mesh(shared(inside_out)))->ridges) EXPECT_EQ(bits, 0);
 }
 
 }  // namespace

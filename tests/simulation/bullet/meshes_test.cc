@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "bullet_scenes.h"
+#include "prescene/geometry/mesh_facts.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/simulation/convex_polytope.h"
 
@@ -201,6 +202,26 @@ TEST(Meshes, AHollowThingFallsOntoTrianglesAndRests) {
   EXPECT_EQ(run.end, belief::TrajectoryEnd::kAtRest);
   EXPECT_NEAR(run.final().objects[0].X_WO.translation.z(), 0.01, 1e-3);
   EXPECT_NEAR((run.final().objects[0].X_WO.rotation * Vector3d::UnitZ()).z(), 1.0, 1e-3);
+}
+
+TEST(Meshes, AnotherSimulatorOfTheSameMeshesMakesNothing) {
+  // While something moves, one is made in every frame: what is made of meshes must not be made again.
+  Scene scene;
+  scene.supports.push_back(support_of("scan", {mesh_shape(grid(2.0, 100), MeshUse::kSurface)}, Pose{}));
+  add_object(scene, model_of("box", {mesh_shape(box_at({0.1, 0.1, 0.1}, Vector3d::Zero()), MeshUse::kConvexHull)}),
+             "box");
+  add_object(scene, model_of("tray", {mesh_shape(geometry::make_open_bin({0.2, 0.2, 0.08}, 0.01), MeshUse::kSpheres)}),
+             "tray");
+  simulation::ShapeStore shapes;
+  ASSERT_TRUE(simulation::make_bullet_simulator(scene, shapes).ok());
+  // The triangles and their trees; the hull and its core; the spheres.
+  EXPECT_EQ(shapes.built(), 5U);
+  const std::size_t facts = geometry::mesh_facts_made();
+  scene.objects[0].name = "another";
+  scene.supports[0].X_WS.translation.z() = 0.1;
+  ASSERT_TRUE(simulation::make_bullet_simulator(scene, shapes).ok());
+  EXPECT_EQ(shapes.built(), 5U);
+  EXPECT_EQ(geometry::mesh_facts_made(), facts);
 }
 
 TEST(Meshes, WhatCannotBeSimulatedIsNamed) {

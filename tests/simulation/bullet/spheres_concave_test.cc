@@ -311,17 +311,20 @@ TEST(ConcaveSpheres, WarmedUpStepsDoNotAllocate) {
 
 TEST(ConcaveSpheres, AreMadeOnceAndRefusedWithAReason) {
   simulation::ShapeStore shapes;
-  const geometry::TriangleMesh mesh = mug();
+  const auto shared = [](geometry::TriangleMesh of) {
+    return std::make_shared<const geometry::TriangleMesh>(std::move(of));
+  };
+  const belief::MeshPtr mesh = shared(mug());
   const auto first = shapes.surface_spheres(mesh, {1000, 0.0});
   ASSERT_TRUE(first.ok());
   EXPECT_EQ(*shapes.surface_spheres(mesh, {1000, 0.0}), *first);
   EXPECT_NE(*shapes.surface_spheres(mesh, {2000, 0.0}), *first);
   EXPECT_EQ(shapes.built(), 2U);
-  geometry::TriangleMesh open = mesh;
+  geometry::TriangleMesh open = *mesh;
   open.triangles.pop_back();
-  EXPECT_THAT(shapes.surface_spheres(open, {}).status().message(), testing::HasSubstr("open"));
-  for (auto& t : open.triangles = mesh.triangles) std::swap(t[0], t[1]);
-  EXPECT_THAT(shapes.surface_spheres(open, {}).status().message(), testing::HasSubstr("inside out"));
+  EXPECT_THAT(shapes.surface_spheres(shared(open), {}).status().message(), testing::HasSubstr("open"));
+  for (auto& t : open.triangles = mesh->triangles) std::swap(t[0], t[1]);
+  EXPECT_THAT(shapes.surface_spheres(shared(open), {}).status().message(), testing::HasSubstr("inside out"));
   EXPECT_FALSE(shapes.surface_spheres(mesh, {10, 0.0}).ok());
   EXPECT_FALSE(shapes.surface_spheres(mesh, {1000, -1.0}).ok());
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shapes that are expensive to make, made once: convex parts of meshes, spheres that stand for meshes, and prepared
 // static triangle meshes, keyed by the mesh's content and the settings. What comes out is shared and never changes, so
-// that any number of simulators and threads may hold it.
+// that any number of simulators and threads may hold it. Meshes do not change any more once they were given.
 //
 //   ShapeStore shapes(decomposer);  // one is in prescene/simulation/bullet/convex_decomposition.h
 //   auto parts = shapes.convex_parts(mesh, belief::MeshUse::kConvexHull, {});
@@ -59,10 +59,10 @@ class ShapeStore {
   /// The parts of a mesh under kConvexHull, kConvexParts or kDecompose. Fails with kInvalidInput for flat or empty
   /// parts and kUnsupported for kSurface
   /// and kSpheres.
-  core::Result<std::shared_ptr<const ConvexParts>> convex_parts(const geometry::TriangleMesh& mesh, belief::MeshUse use,
+  core::Result<std::shared_ptr<const ConvexParts>> convex_parts(const belief::MeshPtr& mesh, belief::MeshUse use,
                                                                 const DecompositionSettings& settings);
   /// Each of convex_parts() with round edges, within `limits`; `radii[i]` (m) is wished for the i-th.
-  core::Result<std::shared_ptr<const std::vector<RoundedPolytope>>> rounded_parts(const geometry::TriangleMesh& mesh,
+  core::Result<std::shared_ptr<const std::vector<RoundedPolytope>>> rounded_parts(const belief::MeshPtr& mesh,
                                                                                   belief::MeshUse use,
                                                                                   const DecompositionSettings& settings,
                                                                                   const std::vector<double>& radii,
@@ -70,9 +70,15 @@ class ShapeStore {
   /// The spheres that stand for a mesh under kSpheres (collision/spheres/surface_spheres.h). Fails with kInvalidInput
   /// when the mesh is open, inside out or empty, or a setting is out of range.
   core::Result<std::shared_ptr<const collision::SurfaceSpheres>> surface_spheres(
-      const geometry::TriangleMesh& mesh, const belief::SphereSettings& settings);
+      const belief::MeshPtr& mesh, const belief::SphereSettings& settings);
   /// Fails with kInvalidInput when the mesh has no triangle.
-  core::Result<std::shared_ptr<const StaticMesh>> static_mesh(const geometry::TriangleMesh& mesh);
+  core::Result<std::shared_ptr<const StaticMesh>> static_mesh(const belief::MeshPtr& mesh);
+
+  /// What a stepper makes of a mesh for itself, kept like the shapes above. `settings` tells apart whatever else `make`
+  /// depends on, what kind of thing it makes included.
+  using Made = std::shared_ptr<const void>;
+  core::Result<Made> made(const belief::MeshPtr& mesh, std::uint64_t settings,
+                          const std::function<core::Result<Made>()>& make);
 
   /// How many shapes have been made so far (not found), for tests and statistics.
   std::size_t built() const;
@@ -96,6 +102,7 @@ class ShapeStore {
   Slots<std::vector<RoundedPolytope>> rounded_;
   Slots<collision::SurfaceSpheres> spheres_;
   Slots<StaticMesh> meshes_;
+  Slots<Made> made_;
   std::size_t built_ = 0;
 };
 
