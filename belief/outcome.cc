@@ -9,6 +9,7 @@
 #include "prescene/belief/scene.h"
 #include "prescene/belief/trajectory.h"
 #include "prescene/core/check.h"
+#include "prescene/geometry/mesh_facts.h"
 
 namespace prescene::belief {
 namespace {
@@ -94,7 +95,7 @@ class Judge {
   const Pose& pose(const WorldState& state) const { return state.objects[object_].X_WO; }
   geometry::Box bounds() const {
     const ObjectModel& model = scene_.model_of(scene_.objects[object_]);
-    return geometry::bounding_box(model.visual ? *model.visual : collision_mesh(model));
+    return model.visual ? geometry::facts_of(model.visual).box : geometry::bounding_box(collision_mesh(model));
   }
   static double angle_between_vectors(const Vector3d& a, const Vector3d& b) {
     return std::atan2(a.cross(b).norm(), a.dot(b));

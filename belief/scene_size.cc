@@ -6,13 +6,25 @@
 #include <limits>
 
 #include "prescene/belief/validation.h"
+#include "prescene/geometry/mesh_facts.h"
 
 namespace prescene::belief {
+namespace {
+
+geometry::Box bounds_of(const ObjectModel& model) {
+  if (model.collision.size() == 1)
+    if (const auto* only = std::get_if<MeshShape>(&model.collision.front());
+        only != nullptr && only->mesh && only->X_OS == geometry::Pose::identity())
+      return geometry::facts_of(only->mesh).box;
+  return geometry::bounding_box(collision_mesh(model));
+}
+
+}  // namespace
 
 double smallest_size(const Scene& scene) {
   double smallest = std::numeric_limits<double>::infinity();
   for (const SceneObject& object : scene.objects) {
-    const double size = std::cbrt(geometry::bounding_box(collision_mesh(scene.model_of(object))).sizes().prod());
+    const double size = std::cbrt(bounds_of(scene.model_of(object)).sizes().prod());
     if (size > 0.0) smallest = std::min(smallest, size);
   }
   return std::isfinite(smallest) ? smallest : kHouseholdSize;

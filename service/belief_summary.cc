@@ -7,6 +7,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/filter/operators/unknown_objects.h"
+#include "prescene/geometry/mesh_facts.h"
 #include "prescene/geometry/triangle_mesh.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/outside_json.h"
@@ -30,6 +31,10 @@ const belief::ObjectModel* model_of(const belief::Scene& scene, const std::strin
 
 geometry::TriangleMesh mesh_of(const belief::ObjectModel& model) {
   return model.visual ? *model.visual : belief::collision_mesh(model);
+}
+
+geometry::Box box_of(const belief::ObjectModel& model) {
+  return model.visual ? geometry::facts_of(model.visual).box : geometry::bounding_box(belief::collision_mesh(model));
 }
 
 interfaces::RosHeader header_of(core::TimeNs stamp_ns, const std::string& frame) {
@@ -152,7 +157,7 @@ BeliefSummary summary_of(const belief::Belief& belief) {
                                object.physics.lessons, object.physics.learned_ns});
     if (!filter::is_unknown_object(object.name)) continue;
     summary.objects.back().is_new = true;
-    summary.objects.back().size = geometry::bounding_box(mesh_of(model)).sizes();
+    summary.objects.back().size = box_of(model).sizes();
   }
   summary.joints = belief::joint_estimates(belief);
   return summary;
@@ -217,7 +222,7 @@ interfaces::RosDetection3dArray detections_of(const BeliefSummary& summary, cons
     detection.results.push_back(
         {{object.model, object.confidence}, interfaces::to_ros_pose(object.X_WO, object.covariance)});
     if (const belief::ObjectModel* model = model_of(scene, object.model)) {
-      const geometry::Box box = geometry::bounding_box(mesh_of(*model));
+      const geometry::Box box = box_of(*model);
       geometry::Pose X_WBox = object.X_WO;
       X_WBox.translation = object.X_WO * geometry::Vector3d(box.center());
       detection.bbox.center = interfaces::to_ros_pose(X_WBox);

@@ -13,6 +13,7 @@
 
 #include "prescene/core/check.h"
 #include "prescene/geometry/dense_solvers.h"
+#include "prescene/geometry/mesh_facts.h"
 
 namespace prescene::filter {
 namespace {
@@ -21,10 +22,11 @@ using belief::MotionMode;
 using belief::ObjectBelief;
 using belief::Particle;
 
-constexpr double kSettleSpeed = 0.04;  // m/s; what is slower than this ...
-constexpr double kSettleRate = 0.5;    // rad/s; ... and this may come to rest
-constexpr double kStayedShift = 1e-3;  // m; what the simulator moves by less in a step ...
-constexpr double kStayedTurn = 0.01;   // rad; ... and turns by less has stayed where it is
+constexpr double kSettleSpeed = 0.04;       // m/s; what is slower than this ...
+constexpr double kSettleRate = 0.5;         // rad/s; ... and this may come to rest
+constexpr double kStayedShift = 1e-3;       // m; what the simulator moves by less in a step ...
+constexpr double kStayedTurn = 0.01;        // rad; ... and turns by less has stayed where it is
+constexpr double kFarAboveRounding = 1e-9;  // m
 constexpr double kPushedSpeed = 0.08;  // m/s, across gravity; what rests is pushed when a simulation makes it as fast
 constexpr double kPushedRate = 1.0;    // rad/s
 
@@ -46,8 +48,21 @@ belief::Scene step_scene(const belief::Belief& belief, std::span<const Pose> X_W
 
 double lowest_point(const std::vector<belief::CollisionShape>& shapes, const Pose& X_W, const Vector3d& up_W) {
   double lowest = std::numeric_limits<double>::infinity();
-  for (const Vector3d& vertex : belief::collision_mesh(shapes).vertices)
-    lowest = std::min(lowest, up_W.dot(X_W * vertex));
+  for (const belief::CollisionShape& shape : shapes) {
+    const auto* of_mesh = std::get_if<belief::MeshShape>(&shape);
+    if (of_mesh == nullptr) {
+      for (const Vector3d& vertex : belief::collision_mesh({shape}).vertices)
+        lowest = std::min(lowest, up_W.dot(X_W * vertex));
+      continue;
+    }
+    // A scanned table has 100,000 vertices: first which are lowest, to far more than rounding, and then how low.
+    const Vector3d up_S = (X_W * of_mesh->X_OS).rotation.conjugate() * up_W;
+    double about = std::numeric_limits<double>::infinity();
+    for (const Vector3d& vertex : of_mesh->mesh->vertices) about = std::min(about, up_S.dot(vertex));
+    for (const Vector3d& vertex : of_mesh->mesh->vertices)
+      if (up_S.dot(vertex) < about + kFarAboveRounding)
+        lowest = std::min(lowest, up_W.dot(X_W * (of_mesh->X_OS * vertex)));
+  }
   return lowest;
 }
 
@@ -67,7 +82,7 @@ std::optional<belief::Support> last_floor(std::span<const Falling> falling, beli
     middle += particle.X_WO.translation / static_cast<double>(falling.size());
     if (up_W.dot(particle.X_WO.translation) >= height) continue;
     const belief::ObjectModel& model = belief::model_of(belief, belief.objects[f.object]);
-    const double reach = model.visual ? geometry::radius_about(*model.visual, Vector3d::Zero()) : 0.0;
+    const double reach = model.visual ? geometry::facts_of(model.visual).reach : 0.0;
     height = up_W.dot(particle.X_WO.translation) - reach;
     belief.lowest_seen = height;
   }
@@ -312,14 +327,13 @@ void move_on_among(const std::vector<std::size_t>& objects, std::span<const Fall
 
 Vector3d centre_of(const belief::Scene& scene, const ObjectBelief& object) {
   const belief::ObjectModel& model = scene.models[static_cast<std::size_t>(object.model)];
-  return model.visual ? geometry::bounding_box(*model.visual).center() : belief::mean(model.center_of_mass);
+  return model.visual ? geometry::facts_of(model.visual).box.center() : belief::mean(model.center_of_mass);
 }
 
 double radius_of(const belief::Scene& scene, const ObjectBelief& object) {
   const belief::ObjectModel& model = scene.models[static_cast<std::size_t>(object.model)];
-  const Vector3d centre = centre_of(scene, object);
-  return model.visual ? geometry::radius_about(*model.visual, centre)
-                      : geometry::radius_about(belief::collision_mesh(model), centre);
+  return model.visual ? geometry::facts_of(model.visual).radius
+                      : geometry::radius_about(belief::collision_mesh(model), centre_of(scene, object));
 }
 
 void clear_twist(Particle& particle) {

@@ -15,6 +15,7 @@
 #include "prescene/core/random.h"
 #include "prescene/filter/operators/predict.h"
 #include "prescene/filter/operators/track_state.h"
+#include "prescene/geometry/mesh_facts.h"
 #include "prescene/geometry/symmetry.h"
 
 namespace prescene::filter {
@@ -58,7 +59,7 @@ class Judge {
       : belief_(belief), object_(object), episode_(*belief.objects[object].motion.episode) {
     const belief::ObjectModel& model = belief::model_of(belief, belief.objects[object]);
     symmetry_ = &model.symmetry;
-    p_OQ_ = model.visual ? geometry::bounding_box(*model.visual).center() : belief::mean(model.center_of_mass);
+    p_OQ_ = model.visual ? geometry::facts_of(model.visual).box.center() : belief::mean(model.center_of_mass);
     for (std::size_t i = 0; i < belief.objects.size(); ++i) {
       const belief::ObjectBelief& other = belief.objects[i];
       if (i != object && (!is_present(other) || i >= episode_.others.size())) continue;
@@ -157,8 +158,8 @@ class Judge {
   Ball ball_of(std::size_t i, const Pose& X_WO) const {
     const belief::ObjectModel& model = belief::model_of(belief_, belief_.objects[i]);
     if (!model.visual) return {X_WO.translation, std::numeric_limits<double>::infinity()};
-    const geometry::Vector3d middle = geometry::bounding_box(*model.visual).center();
-    return {X_WO * middle, geometry::radius_about(*model.visual, middle)};
+    const geometry::MeshFacts facts = geometry::facts_of(model.visual);
+    return {X_WO * facts.box.center(), facts.radius};
   }
 
   /// Of the others, leaves out those that neither the object on its way nor what it may push can touch.

@@ -8,6 +8,7 @@
 #include "falling_particles.h"
 #include "prescene/core/check.h"
 #include "prescene/geometry/dense_solvers.h"
+#include "prescene/geometry/mesh_facts.h"
 #include "prescene/geometry/sampling.h"
 
 namespace prescene::filter {
@@ -159,6 +160,21 @@ void end_pushes(double dt, belief::Belief& belief) {
   });
 }
 
+/// A box about the shapes, the smallest one but for meshes that are turned in their body.
+geometry::Box bounds_of(const std::vector<belief::CollisionShape>& shapes) {
+  geometry::Box box;
+  for (const belief::CollisionShape& shape : shapes) {
+    if (const auto* of_mesh = std::get_if<belief::MeshShape>(&shape)) {
+      const geometry::Box own = geometry::facts_of(of_mesh->mesh).box;
+      for (int corner = 0; corner < 8; ++corner)
+        box.extend(of_mesh->X_OS * own.corner(static_cast<geometry::Box::CornerType>(corner)));
+    } else {
+      for (const Vector3d& vertex : belief::collision_mesh({shape}).vertices) box.extend(vertex);
+    }
+  }
+  return box;
+}
+
 /// What is known to move in this step: pushes, and bodies of the robot.
 std::vector<Mover> movers_of(const belief::Belief& belief, std::span<const Pose> X_WG, double dt) {
   std::vector<Mover> movers;
@@ -168,8 +184,7 @@ std::vector<Mover> movers_of(const belief::Belief& belief, std::span<const Pose>
   }
   for (std::size_t i = 0; i < X_WG.size(); ++i) {
     if (stands_still(belief.robot[i], X_WG[i])) continue;
-    geometry::Box box;
-    for (const Vector3d& vertex : belief::collision_mesh(belief.scene->robot[i].collision).vertices) box.extend(vertex);
+    const geometry::Box box = bounds_of(belief.scene->robot[i].collision);
     if (!box.isEmpty())
       movers.push_back({belief.robot[i] * box.center(), X_WG[i] * box.center(), 0.5 * box.diagonal().norm()});
   }

@@ -14,6 +14,7 @@
 #include "prescene/core/check.h"
 #include "prescene/filter/operators/rivals.h"
 #include "prescene/filter/operators/track_state.h"
+#include "prescene/geometry/mesh_facts.h"
 #include "prescene/geometry/symmetry.h"
 
 namespace prescene::filter {
@@ -113,12 +114,12 @@ const SphereTree* TouchTest::tree_of(const belief::ObjectModel& model, core::Thr
     const auto known = memory_->by_visual.find(model.visual);
     if (known != memory_->by_visual.end()) return known->second.get();
   }
-  const geometry::TriangleMesh collision = model.visual ? geometry::TriangleMesh() : belief::collision_mesh(model);
-  const geometry::TriangleMesh& mesh = model.visual ? *model.visual : collision;
-  const auto [entry, is_new] = memory_->by_content.try_emplace(geometry::content_hash(mesh), nullptr);
+  const belief::MeshPtr mesh =
+      model.visual ? model.visual : std::make_shared<const geometry::TriangleMesh>(belief::collision_mesh(model));
+  const auto [entry, is_new] = memory_->by_content.try_emplace(geometry::facts_of(mesh).content, nullptr);
   if (is_new) {
     const auto make = [&]() -> core::Result<std::shared_ptr<const SphereTree>> {
-      PRESCENE_TRY(const auto checked, collision::Mesh::make(mesh, model.name));
+      PRESCENE_TRY(const auto checked, collision::Mesh::make(*mesh, model.name));
       collision::PackingOptions options;
       options.max_spheres = kTouchSpheres;
       options.close_holes = true;
