@@ -11,6 +11,7 @@
 #include "prescene/core/hash.h"
 #include "prescene/core/parallel.h"
 #include "prescene/geometry/mesh_facts.h"
+#include "scan_hull.h"
 
 namespace prescene::simulation {
 namespace {
@@ -32,9 +33,9 @@ std::uint64_t settings_hash(belief::MeshUse use, const DecompositionSettings& se
 core::Result<ConvexParts> hulls_of(const std::vector<TriangleMesh>& meshes) {
   ConvexParts parts;
   for (std::size_t i = 0; i < meshes.size(); ++i) {
-    core::Result<ConvexPolytope> polytope = make_polytope(meshes[i].vertices);
-    if (!polytope) return polytope.status().at("convex part " + std::to_string(i + 1));
-    parts.push_back(std::move(*polytope));
+    core::Result<ConvexPolytope> hull = hull_of_scan(meshes[i].vertices);
+    if (!hull) return hull.status().at("convex part " + std::to_string(i + 1));
+    parts.push_back(std::move(*hull));
   }
   if (parts.empty()) return core::invalid_input("the mesh has no triangle; check its file");
   return parts;

@@ -107,6 +107,28 @@ TEST(ShapeStore, ConvexPartsAreTheComponents) {
   EXPECT_EQ((*store.convex_parts(two, belief::MeshUse::kConvexHull, {}))->size(), 1u);
 }
 
+TEST(ShapeStore, AHullOfAScanHasFewVerticesAndIsNearlyTheWholeHull) {
+  simulation::ShapeStore store;
+  // Round all over, and round between two flat faces of 3000 corners.
+  const TriangleMesh ball = geometry::make_mesh(geometry::Sphere{0.05}, 200);
+  const TriangleMesh can = geometry::make_mesh(geometry::Cylinder{0.03, 0.1}, 3000);
+  for (const TriangleMesh& scan : {ball, can}) {
+    ASSERT_GT(scan.vertices.size(), 5000u);
+    const auto parts = *store.convex_parts(shared(scan), belief::MeshUse::kConvexHull, {});
+    ASSERT_EQ(parts->size(), 1u);
+    EXPECT_LE(parts->front().vertices.size(), 1500u);
+    double highest = 0.0;
+    for (const ConvexPolytope::Face& face : parts->front().faces)
+      for (const Vector3d& v : scan.vertices) highest = std::max(highest, face.normal.dot(v) - face.offset);
+    EXPECT_LT(highest, 0.002 * geometry::bounding_box(scan).diagonal().norm());
+  }
+  const auto parts = *store.convex_parts(shared(can), belief::MeshUse::kConvexHull, {});
+  for (const double up : {-1.0, 1.0})
+    EXPECT_TRUE(std::any_of(parts->front().faces.begin(), parts->front().faces.end(), [&](const auto& face) {
+      return up * face.normal.z() > 1.0 - 1e-9 && face.loop.size() >= 32;
+    })) << up;
+}
+
 TEST(ShapeStore, SaysWhatItCannotDo) {
   simulation::ShapeStore store;
   const belief::MeshPtr mesh = shared(box_mesh({0.1, 0.1, 0.1}));

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Hulls of smooth scans have as many vertices as the scans. To tell the faces of such a hull apart takes time with the
+// square of that: minutes for 50,000 vertices.
+#pragma once
+
+#include <vector>
+
+#include "prescene/simulation/convex_polytope.h"
+
+namespace prescene::simulation {
+
+/// make_polytope(), but of a hull with more than 1500 vertices only those that are the farthest out in one of 1000
+/// directions, and corners of its flat faces. What is left out is at most 0.2 % of the hull's size above the faces.
+core::Result<ConvexPolytope> hull_of_scan(const std::vector<Vector3d>& points);
+
+}  // namespace prescene::simulation
