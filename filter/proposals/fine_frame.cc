@@ -58,7 +58,7 @@ FineFrame sampled_fine(const FilterFrame& frame, const belief::Scene& scene, con
     for (int y = 0; y < camera.height; ++y)
       for (int x = 0; x < camera.width; ++x) fine.color(x, y) = (*rgbd.color)(offset + step * x, offset + step * y);
   }
-  const BeliefView known = known_surroundings(scene, frame.X_WG, MeshDetail::kDisplay, *tools.meshes);
+  const BeliefView known = known_surroundings(scene, frame.X_WG, MeshDetail::kSurroundings, *tools.meshes);
   rendering::FrameTermsInput input;
   input.camera = camera;
   input.depth = depth.view();

@@ -74,7 +74,7 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
     if (!pose.is_finite()) return core::invalid_input("a robot body's pose is not finite: check its transforms");
   PRESCENE_RETURN_IF_ERROR(geometry::validate(rgbd.camera).at("the frame's camera"));
 
-  const BeliefView known = known_surroundings(*scene, X_WG, MeshDetail::kDisplay, *tools.meshes);
+  const BeliefView known = known_surroundings(*scene, X_WG, MeshDetail::kSurroundings, *tools.meshes);
   if (cache.scene != scene || !cache.surfaces) {
     cache.surfaces = std::make_shared<const SupportSurfaces>(*scene, *tools.meshes);
     cache.robot.assign(scene->robot.size(), {});

@@ -7,11 +7,14 @@
 #include "prescene/core/check.h"
 #include "prescene/filter/proposals/facets.h"
 #include "prescene/filter/proposals/resting_starts.h"
+#include "prescene/geometry/mesh_facts.h"
 
 namespace prescene::filter {
 namespace {
 
-constexpr int kFineTriangles = 5;  // times as many as for likelihoods
+// Times as many as for likelihoods.
+constexpr int kFineTriangles = 5;
+constexpr int kSurroundingsTriangles = 50;
 
 geometry::Rgb rgb_of(const belief::Color& color) {
   const auto channel = [](double value) {
@@ -53,14 +56,25 @@ rendering::MeshHandle MeshCache::get(const belief::MeshPtr& mesh, MeshDetail det
   Entry& entry = by_address_[{mesh.get(), detail}];
   if (entry.mesh) return entry.mesh;
   entry.source = mesh;
-  rendering::MeshHandle& handle = by_content_[{geometry::content_hash(*mesh), detail}];
+  rendering::MeshHandle& handle = by_content_[{geometry::facts_of(mesh).content, detail}];
   if (!handle) {
-    const int triangles = (detail == MeshDetail::kFine ? kFineTriangles : 1) * likelihood_triangles_;
     handle = detail == MeshDetail::kDisplay ? rendering::make_render_mesh(*mesh)
-                                            : rendering::make_render_mesh(geometry::simplified(*mesh, triangles));
+                                            : rendering::make_render_mesh(simplified(mesh, detail));
   }
   entry.mesh = handle;
   return handle;
+}
+
+geometry::TriangleMesh MeshCache::simplified(const belief::MeshPtr& mesh, MeshDetail detail) {
+  const std::uint64_t content = geometry::facts_of(mesh).content;
+  const auto at_most = [this](int times) { return times * likelihood_triangles_; };
+  const bool is_large = mesh->triangles.size() > static_cast<std::size_t>(at_most(kSurroundingsTriangles));
+  if (detail == MeshDetail::kSurroundings) return geometry::simplified(*mesh, at_most(kSurroundingsTriangles));
+  if (!is_large) return geometry::simplified(*mesh, at_most(detail == MeshDetail::kFine ? kFineTriangles : 1));
+  // Of a scan of 100,000 triangles that takes a second: once will do.
+  geometry::TriangleMesh& fine = fine_[content];
+  if (fine.empty()) fine = geometry::simplified(*mesh, at_most(kFineTriangles));
+  return detail == MeshDetail::kFine ? fine : geometry::simplified(fine, at_most(1));
 }
 
 rendering::MeshHandle MeshCache::get(const belief::ObjectModel& model, MeshDetail detail) {

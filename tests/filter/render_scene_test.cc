@@ -22,6 +22,25 @@ TEST(MeshCache, MakesAMeshOnceByAddressAndByContent) {
   EXPECT_GT(coarse->triangles.size(), 20u);
 }
 
+TEST(MeshCache, ScansAreDrawnCoarserAndNearlyTheSame) {
+  MeshCache meshes;
+  const auto scan = std::make_shared<const geometry::TriangleMesh>(geometry::make_mesh(geometry::Sphere{0.1}, 200));
+  ASSERT_GT(scan->triangles.size(), 30000u);
+  const std::pair<MeshDetail, std::size_t> levels[] = {
+      {MeshDetail::kSurroundings, 20000}, {MeshDetail::kFine, 2000}, {MeshDetail::kLikelihood, 400}};
+  for (const auto& [detail, most] : levels) {
+    const auto mesh = meshes.get(scan, detail);
+    EXPECT_LE(mesh->triangles.size(), most);
+    EXPECT_GT(2 * mesh->triangles.size(), most);
+    // A ball in n triangles is about 2 pi / (sqrt(3) n) of its radius off at their middles.
+    const double off = 0.1 * 8.0 / static_cast<double>(most);
+    for (const auto& vertex : mesh->vertices)
+      EXPECT_NEAR(static_cast<double>(vertex.norm()), 0.1, std::max(off, 2e-5)) << most;
+  }
+  const auto few = std::make_shared<const geometry::TriangleMesh>(geometry::make_mesh(geometry::Sphere{0.1}, 32));
+  EXPECT_EQ(meshes.get(few, MeshDetail::kSurroundings)->triangles.size(), few->triangles.size());
+}
+
 TEST(MeshCache, FallsBackToTheCollisionShapes) {
   MeshCache meshes;
   const std::vector<belief::CollisionShape> shapes = {

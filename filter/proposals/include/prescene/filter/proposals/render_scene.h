@@ -25,15 +25,17 @@ struct RestingShape;  // prescene/filter/proposals/resting_starts.h
 
 /// How fine a mesh is drawn.
 enum class MeshDetail {
-  kLikelihood,  ///< Simplified: finer meshes gave no better pose on real frames.
-  kFine,        ///< For images whose pixels are 3 to 4 mm wide at 1 m: there the simplified one is not exact enough.
-  kDisplay,     ///< As it is.
+  kLikelihood,    ///< Simplified: finer meshes gave no better pose on real frames.
+  kFine,          ///< For images whose pixels are 3 to 4 mm wide at 1 m: there the simplified one is not exact enough.
+  kSurroundings,  ///< For supports and bodies of the robot in what the filter draws of them in each frame.
+  kDisplay,       ///< As it is.
 };
 
 /// Meshes as renderers want them, made on first use and kept. Safe to call from several threads.
 class MeshCache {
  public:
-  /// Meshes for likelihoods have at most so many triangles (>= 4), those for fine images five times as many.
+  /// Meshes for likelihoods have at most so many triangles (>= 4), those for fine images five times as many, those of
+  /// surroundings fifty times as many. Of meshes with more than the last, the coarsest are made of the fine ones.
   explicit MeshCache(int likelihood_triangles = 400) : likelihood_triangles_(likelihood_triangles) {}
 
   /// Never null. The cache keeps `mesh` alive, so that its address stays its name.
@@ -56,11 +58,15 @@ class MeshCache {
     geometry::LookPtr look;
     rendering::MeshHandle mesh;
   };
+  /// With the mutex held.
+  geometry::TriangleMesh simplified(const belief::MeshPtr& mesh, MeshDetail detail);
+
   int likelihood_triangles_;
   std::mutex mutex_;
   std::map<std::pair<const geometry::TriangleMesh*, MeshDetail>, Entry> by_address_;
   std::map<std::pair<const geometry::TriangleMesh*, const geometry::MeshLook*>, Entry> with_look_;
   std::map<std::pair<std::uint64_t, MeshDetail>, rendering::MeshHandle> by_content_;
+  std::map<std::uint64_t, geometry::TriangleMesh> fine_;  // of large meshes, by content
   // By the mesh's unique number.
   std::map<std::uint64_t, double> facet_levers_;
   std::map<std::uint64_t, std::shared_ptr<const RestingShape>> resting_shapes_;
