@@ -121,6 +121,29 @@ ParticleFilter::ParticleFilter(const rendering::LikelihoodBatch& likelihood, ren
       renderer_(renderer),
       tools_{&search_, &renderer_, &meshes_, settings_.learned.get()} {}
 
+void ParticleFilter::prepare(const belief::Scene& scene) {
+  for (const belief::ObjectModel& model : scene.models)
+    for (const MeshDetail detail : {MeshDetail::kFine, MeshDetail::kLikelihood}) {
+      const rendering::MeshHandle mesh = meshes_.get(model.visual, model.collision, detail);
+      meshes_.facet_lever(*mesh);
+      meshes_.resting_shape(*mesh);
+    }
+  const std::vector<belief::Pose> X_WG(scene.robot.size());
+  for (const MeshDetail detail : {MeshDetail::kSurroundings, MeshDetail::kLikelihood})
+    known_surroundings(scene, X_WG, detail, meshes_);
+  // What can't be simulated is said by the step that wants to.
+  belief::Scene alone = scene;
+  alone.actions.clear();
+  alone.outcomes.clear();
+  alone.exclusive_outcomes.clear();
+  alone.joints.clear();
+  for (const belief::SceneObject& object : scene.objects) {
+    alone.objects = {object};
+    alone.objects.front().held_by.reset();
+    if (simulators_) static_cast<void>(simulators_(alone, 1.0));
+  }
+}
+
 Belief ParticleFilter::start(std::shared_ptr<const belief::Scene> scene, std::uint64_t seed) const {
   return belief_from_priors(std::move(scene), seed, 0, settings_.initialise);
 }

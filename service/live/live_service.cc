@@ -85,6 +85,7 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
                                                                std::unique_ptr<RollingRecording> recording,
                                                                const core::LogSink& log) {
   PRESCENE_TRY(auto tracker, Tracker::create(scene, settings.tracker, seed, backends));
+  tracker->prepare();
   auto impl = std::make_unique<Impl>(std::move(scene), settings, std::move(tracker), std::move(recording), log);
   impl->backends = &backends;
   PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, log));

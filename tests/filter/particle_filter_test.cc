@@ -55,6 +55,23 @@ TEST(ParticleFilter, TracksAMovingCarton) {
   EXPECT_LT(adds[22], 0.005);
 }
 
+TEST(ParticleFilter, PreparesWhatStepsTakeAndChangesNoBelief) {
+  Backends backends;
+  const SimulatedSequence sequence = carried_carton(0.22, 1.44, 103);
+  const belief::Observation first = sequence.observe(0, *backends.renderer);
+  int simulators = 0;
+  const simulation::SimulatorFactory failing = [&](const belief::Scene& scene,
+                                                   double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+    simulators += static_cast<int>(scene.objects.size());
+    return core::unsupported("none");
+  };
+  ParticleFilter prepared = backends.make_filter({}, failing), other = backends.make_filter({}, failing);
+  prepared.prepare(*sequence.scene);
+  EXPECT_EQ(simulators, 1);
+  EXPECT_EQ(belief::content_hash(prepared.step(prepared.start(sequence.scene, 7), first, {}).belief),
+            belief::content_hash(other.step(other.start(sequence.scene, 7), first, {}).belief));
+}
+
 TEST(ParticleFilter, ARobotBodyThatIsNotNamedStandsWhereItWasLast) {
   Backends backends;
   SimulatedSequence sequence =

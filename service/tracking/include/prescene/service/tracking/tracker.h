@@ -45,6 +45,9 @@ class Tracker {
                                                        const TrackerSettings& settings, std::uint64_t seed,
                                                        Backends& backends);
 
+  /// As ParticleFilter::prepare(), of the tracker's scene: what listens to a camera does so before the first frame.
+  void prepare() { filter_.prepare(*scene_); }
+
   /// Takes in one message of the robot, or one on kSettingsTopic, whose settings hold from the next step on; topics
   /// that nobody listens to are ignored. Numbers ascend. A message that says something impossible is refused, and named
   /// with its topic; nothing else is lost by it.
