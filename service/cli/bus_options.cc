@@ -144,7 +144,8 @@ void add_part_options(CLI::App& verb, PartLimits& limits) {
       ->check(number_between(1.0, 1e9));
   verb.add_option_function<double>(
           "--keep-megabytes", [&limits, bytes](const double& megabytes) { limits.keep_bytes = bytes(megabytes); },
-          "Remove the oldest files of this recording while all of them have more; the newest two stay")
+          "Remove the oldest files of this recording while all of them have more, those of earlier runs under the same "
+          "name included; the newest two stay")
       ->check(number_between(1.0, 1e9));
 }
 
