@@ -2,6 +2,7 @@
 #include "disk.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -22,7 +23,11 @@ core::Status disk_error(const std::filesystem::path& path, int error) {
 }
 
 core::Status sync_content(int descriptor, const std::filesystem::path& path) {
-  return ::fdatasync(descriptor) == 0 || has_no_disk(errno) ? core::ok_status() : disk_error(path, errno);
+  if (::fdatasync(descriptor) != 0 && !has_no_disk(errno)) return disk_error(path, errno);
+  struct stat information {};
+  if (::fstat(descriptor, &information) == 0 && S_ISREG(information.st_mode) && information.st_nlink == 0)
+    return core::unavailable(path.string() + ": was removed while it was written; what was in it is lost");
+  return core::ok_status();
 }
 
 core::Result<int> open_folder_of(const std::filesystem::path& path) {

@@ -12,7 +12,7 @@ namespace prescene::interfaces {
 core::Status disk_error(const std::filesystem::path& path, int error);
 
 /// Waits until what was written to an open file is on the disk. Pipes and character devices can't be waited for; that
-/// is no loss. Errors speak of `path`.
+/// is no loss. A file that has no name any more is an error. Errors speak of `path`.
 core::Status sync_content(int descriptor, const std::filesystem::path& path);
 
 /// Waits until the file's name in its folder is on the disk, too: a new file may be gone after a power failure

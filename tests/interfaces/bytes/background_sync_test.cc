@@ -43,6 +43,21 @@ TEST(BackgroundSync, IsAtRiskWhileTheDiskIsNotAsked) {
   EXPECT_TRUE(file->close().ok()) << "the other descriptor stays, and the end waits for no hour";
 }
 
+TEST(BackgroundSync, TellsThatTheFileWasRemoved) {
+  const tests::ScratchDir scratch;
+  auto file = OutputFile::create(scratch.path() / "a");
+  ASSERT_TRUE(file.ok());
+  const auto sync = BackgroundSync::start(scratch.path() / "a", milliseconds(1));
+  ASSERT_TRUE(sync.ok());
+  std::filesystem::remove(scratch.path() / "a");
+  ASSERT_TRUE(file->write(std::vector<std::uint8_t>(1000)).ok()) << "the system keeps it as long as it is open";
+  (*sync)->note_written();
+  while ((*sync)->seconds_at_risk() > 0.0) std::this_thread::yield();
+  EXPECT_EQ((*sync)->status().code(), core::StatusCode::kUnavailable);
+  EXPECT_NE((*sync)->status().message().find("/a: was removed while it was written"), std::string::npos)
+      << (*sync)->status().message();
+}
+
 TEST(BackgroundSync, TellsThatThereIsNoDescriptorLeft) {
   const tests::ScratchDir scratch;
   auto file = OutputFile::create(scratch.path() / "a");
