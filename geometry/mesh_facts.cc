@@ -58,7 +58,8 @@ class FactsTable {
 };
 
 FactsTable& facts_table() {
-  static FactsTable table;
+  // Never destroyed: threads of other languages may still ask when the process ends.
+  static FactsTable& table = *new FactsTable;
   return table;
 }
 

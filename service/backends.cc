@@ -75,7 +75,11 @@ class InsteadOfLockstep : public simulation::Simulator {
       : bullet_(std::move(bullet)), reason_(std::move(reason)) {}
 
   core::Status supports(const simulation::RunRequest& request) const override { return bullet_->supports(request); }
-  simulation::StepperUse stepper() const override { return {bullet_->stepper().name, reason_}; }
+  simulation::StepperUse stepper() const override {
+    simulation::StepperUse use = bullet_->stepper();
+    use.not_lockstep = reason_;
+    return use;
+  }
   void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
            const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
            std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const override {

@@ -159,6 +159,25 @@ interfaces::SceneFileOptions with(interfaces::SceneFileOptions options, Symmetri
   return options;
 }
 
+/// Of supports and robot bodies: what is drawn of them in each frame has at most so many triangles (filter::MeshCache).
+constexpr std::size_t kMostDrawn = 20'000;
+
+void remark_on_large_surroundings(const belief::Scene& scene, const std::filesystem::path& path,
+                                  interfaces::FileReport& report) {
+  const auto look_at = [&](const std::string& key, const auto& body) {
+    const auto mesh = body.visual ? *body.visual : belief::collision_mesh(body.collision);
+    if (mesh.triangles.size() <= kMostDrawn) return;
+    report.remarks.push_back(
+        {path.string(), 0, 0, key + "." + body.name,
+         "of its " + std::to_string(mesh.triangles.size()) + " triangles at most " + std::to_string(kMostDrawn) +
+             " are drawn for what a camera should see, so that details are lost; things still rest "
+             "on all of it",
+         "give it parts, or a 'visual' mesh of fewer triangles, if small details matter"});
+  };
+  for (const belief::Support& support : scene.supports) look_at("supports", support);
+  for (const belief::KinematicBody& body : scene.robot) look_at("robot", body);
+}
+
 void log_warnings(const interfaces::FileReport& report, const core::LogSink& log) {
   for (const interfaces::Problem& warning : report.warnings) core::log(log, core::LogLevel::kWarning, warning.text());
 }
@@ -196,6 +215,7 @@ core::Result<std::shared_ptr<const belief::Scene>> load_scene_text(const std::st
   MeshRemarks remarks(log, Repairs::kCounted);
   auto scene = interfaces::parse_scene(text, path.string(), with(options(remarks, path, files), symmetries), &report);
   remarks.finish(path);
+  if (scene) remark_on_large_surroundings(*scene, path, report);
   log_remarks(report, log);
   return shared(std::move(scene), report, log);
 }
@@ -207,6 +227,7 @@ core::Result<std::shared_ptr<const belief::Scene>> load_reported_scene(const std
                                                                        Symmetries symmetries) {
   MeshRemarks remarks(log, Repairs::kEach);
   auto scene = interfaces::parse_scene(text, path.string(), with(options(remarks, path), symmetries), &report);
+  if (scene) remark_on_large_surroundings(*scene, path, report);
   return shared(std::move(scene), report, log);
 }
 

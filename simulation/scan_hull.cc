@@ -18,6 +18,7 @@ using geometry::TriangleMesh;
 
 constexpr std::size_t kMostOfScan = 1500;
 constexpr int kDirections = 1000;
+constexpr double kMostLeftOut = 0.002;  // of the bounding box's diagonal
 // Flat faces that are kept: those of the largest triangles of the hull.
 constexpr std::size_t kFlatFaces = 64;
 constexpr int kCornersOfFlat = 32;
@@ -75,17 +76,30 @@ core::Result<ConvexPolytope> hull_of_scan(const std::vector<Vector3d>& points) {
   if (points.size() <= kMostOfScan) return make_polytope(points);
   PRESCENE_TRY(const TriangleMesh hull, geometry::convex_hull(points));
   if (hull.vertices.size() <= kMostOfScan) return make_polytope(points);
+  const geometry::Box box = geometry::bounding_box(hull);
   std::set<std::uint32_t> chosen;
-  for (int k = 0; k < kDirections; ++k) {  // evenly over the sphere, on a spiral
+  for (int k = 0; k < kDirections; ++k) {  // evenly over the sphere, on a spiral, of the hull scaled to a cube
     const double z = 1.0 - (2.0 * k + 1.0) / kDirections, across = std::sqrt(1.0 - z * z);
     const double angle = std::numbers::pi * (3.0 - std::sqrt(5.0)) * k;
-    chosen.insert(farthest_out(hull.vertices, {across * std::cos(angle), across * std::sin(angle), z}));
+    const Vector3d direction(across * std::cos(angle), across * std::sin(angle), z);
+    chosen.insert(farthest_out(hull.vertices, direction.cwiseQuotient(box.sizes())));
   }
   add_flat_faces(hull, chosen);
-  std::vector<Vector3d> kept;
-  kept.reserve(chosen.size());
-  for (const std::uint32_t i : chosen) kept.push_back(hull.vertices[i]);
-  return make_polytope(kept);
+  const double most = kMostLeftOut * box.diagonal().norm();
+  for (;;) {
+    std::vector<Vector3d> kept;
+    kept.reserve(chosen.size());
+    for (const std::uint32_t i : chosen) kept.push_back(hull.vertices[i]);
+    PRESCENE_TRY(ConvexPolytope polytope, make_polytope(kept));
+    const std::size_t before = chosen.size();
+    for (const ConvexPolytope::Face& face : polytope.faces) {
+      const std::uint32_t farthest = farthest_out(hull.vertices, face.normal);
+      const double height = face.normal.dot(hull.vertices[farthest]) - face.offset;
+      if (height > most) chosen.insert(farthest);
+      polytope.left_out = std::max(polytope.left_out, height);
+    }
+    if (chosen.size() == before) return polytope;
+  }
 }
 
 }  // namespace prescene::simulation

@@ -10,7 +10,8 @@
 namespace prescene::simulation {
 
 /// make_polytope(), but of a hull with more than 1500 vertices only those that are the farthest out in one of 1000
-/// directions, and corners of its flat faces. What is left out is at most 0.2 % of the hull's size above the faces.
+/// directions, corners of its flat faces, and those without which it would be off by more than 0.2 % of the diagonal of
+/// its bounding box. ConvexPolytope::left_out says by how much it is.
 core::Result<ConvexPolytope> hull_of_scan(const std::vector<Vector3d>& points);
 
 }  // namespace prescene::simulation

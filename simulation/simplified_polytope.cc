@@ -195,6 +195,7 @@ core::Result<RoundedPolytope> rounded(const ConvexPolytope& polytope, double rad
   result.core = std::move(core.polytope);
   if (hull.error > 0.0 || core.error > 0.0)
     result.error = std::max(0.0, largest_height(result.core, polytope.vertices) - result.radius);
+  result.error += polytope.left_out;
   return result;
 }
 

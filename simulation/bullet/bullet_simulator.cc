@@ -89,7 +89,7 @@ class BulletSimulator : public Simulator {
  public:
   explicit BulletSimulator(std::shared_ptr<const CompiledScene> scene) : scene_(std::move(scene)) {}
 
-  StepperUse stepper() const override { return {"bullet", ""}; }
+  StepperUse stepper() const override { return {"bullet", "", scene_->hull_error}; }
 
   void run(std::span<const belief::WorldState> starts, const RunRequest& request, const core::RandomStream& stream,
            InstanceNumbers numbers, core::ThreadPool& pool, std::span<belief::Trajectory> trajectories,

@@ -35,7 +35,10 @@ struct ShapeMaker {
   bool spheres = false;  // some object collides as spheres
 };
 
-using Cores = std::vector<std::shared_ptr<const ConvexCore>>;
+struct Cores {
+  std::vector<std::shared_ptr<const ConvexCore>> all;
+  double left_out = 0.0;  // m, the largest of their polytopes
+};
 
 /// Of the convex parts of a mesh. Each simulator of a scene takes the same ones, as moving their faces inwards takes
 /// long.
@@ -49,8 +52,10 @@ core::Result<std::shared_ptr<const Cores>> cores_of(const belief::MeshShape& mes
                maker.shapes.made(mesh.mesh, hasher.digest(), [&]() -> core::Result<ShapeStore::Made> {
                  PRESCENE_TRY(const auto parts, maker.shapes.convex_parts(mesh.mesh, mesh.use, settings));
                  Cores cores;
-                 for (const ConvexPolytope& polytope : *parts)
-                   cores.push_back(ConvexCore::from_polytope(polytope, rounding));
+                 for (const ConvexPolytope& polytope : *parts) {
+                   cores.all.push_back(ConvexCore::from_polytope(polytope, rounding));
+                   cores.left_out = std::max(cores.left_out, polytope.left_out);
+                 }
                  return ShapeStore::Made(std::make_shared<const Cores>(std::move(cores)));
                }));
   return std::static_pointer_cast<const Cores>(made);
@@ -100,7 +105,8 @@ core::Status add_shape(const belief::CollisionShape& shape, bool fixed, double r
     return core::ok_status();
   }
   PRESCENE_TRY(const auto cores, cores_of(mesh, rounding, maker));
-  for (const std::shared_ptr<const ConvexCore>& core : *cores) body.parts.push_back(convex_part(core, mesh.X_OS));
+  for (const std::shared_ptr<const ConvexCore>& core : cores->all) body.parts.push_back(convex_part(core, mesh.X_OS));
+  body.hull_error = std::max(body.hull_error, cores->left_out);
   return core::ok_status();
 }
 
@@ -181,6 +187,8 @@ core::Result<std::shared_ptr<const CompiledScene>> compile_scene(const belief::S
   }
   for (const belief::Joint& joint : scene.joints) compiled->joints.push_back(compile_joint(joint, *compiled));
   compiled->joint_order = belief::joint_order(scene);
+  for (const CompiledBody& body : compiled->bodies)
+    compiled->hull_error = std::max(compiled->hull_error, body.hull_error);
   return std::shared_ptr<const CompiledScene>(std::move(compiled));
 }
 

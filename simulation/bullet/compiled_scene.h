@@ -34,6 +34,7 @@ struct CompiledBody {
   Pose X_WO;                                 ///< Of supports.
   Vector3d unit_moments = Vector3d::Ones();  ///< Of objects: principal moments for 1 kg, m^2.
   Matrix3d R_OP = Matrix3d::Identity();      ///< Of objects: principal axes.
+  double hull_error = 0.0;                   ///< m: ConvexPolytope::left_out of its hulls, the largest.
 };
 
 struct CompiledJoint {
@@ -52,6 +53,7 @@ struct CompiledScene {
   std::vector<CompiledJoint> joints;  ///< In the scene's order.
   std::vector<int> joint_order;       ///< Of these, parents first.
   std::uint64_t hash = 0;             ///< Of what steps depend on.
+  double hull_error = 0.0;            ///< m: the largest of all bodies.
   int object_count = 0;
   int support_count = 0;
   int robot_count = 0;

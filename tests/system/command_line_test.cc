@@ -591,6 +591,40 @@ void write_mug(const std::filesystem::path& path) {
   ASSERT_TRUE(interfaces::write_ply(path, mug).ok());
 }
 
+// What is drawn of a scanned table in each frame is simplified: who has one is told, whatever he does with it.
+TEST(CommandLine, NamesSurroundingsOfWhichNotAllTrianglesAreDrawn) {
+  const ScratchDir folder;
+  const auto file = [&](const std::string& name) { return (folder.path() / name).string(); };
+  const auto write_table = [&](const std::string& name, int cells) {
+    std::string obj;
+    for (int i = 0; i <= cells; ++i)
+      for (int j = 0; j <= cells; ++j) obj += "v " + std::to_string(0.01 * i) + " " + std::to_string(0.01 * j) + " 0\n";
+    const auto corner = [cells](int i, int j) { return std::to_string(1 + i * (cells + 1) + j); };
+    for (int i = 0; i < cells; ++i)
+      for (int j = 0; j < cells; ++j) {
+        obj += "f " + corner(i, j) + " " + corner(i + 1, j) + " " + corner(i + 1, j + 1) + "\n";
+        obj += "f " + corner(i, j) + " " + corner(i + 1, j + 1) + " " + corner(i, j + 1) + "\n";
+      }
+    write_file(file(name), obj);
+  };
+  const auto remarks_on = [&](const std::string& table) {
+    write_file(file("scanned.yaml"),
+               "name: scanned\nmodels:\n  box: {box: [0.1, 0.1, 0.1], density: 500, symmetry: cuboid}\n"
+               "supports:\n  desk: {mesh: {file: " +
+                   table +
+                   ", use: surface}}\n"
+                   "objects:\n  box: {model: box, pose: {position: [0.3, 0.3, 0.05]}}\n");
+    const Finished valid = run_program({"validate", file("scanned.yaml"), "--json"});
+    EXPECT_EQ(valid.exit_code, 0) << valid.err << valid.out;
+    return parsed(valid)["files"][0]["remarks"].dump();
+  };
+  write_table("fine.obj", 110);
+  write_table("coarse.obj", 90);
+  EXPECT_NE(remarks_on("fine.obj").find("supports.desk: of its 24200 triangles at most 20000 are drawn"),
+            std::string::npos);
+  EXPECT_EQ(remarks_on("coarse.obj").find("supports.desk"), std::string::npos);
+}
+
 TEST(CommandLine, WhatFallsIntoAnInspectedMugLandsInIt) {
   const ScratchDir folder;
   const auto file = [&](const std::string& name) { return (folder.path() / name).string(); };

@@ -22,6 +22,7 @@ struct ConvexPolytope {
   };
   std::vector<Vector3d> vertices;  ///< m
   std::vector<Face> faces;
+  double left_out = 0.0;  ///< m: how far the hull that it stands for reaches beyond it; 0 = it is that hull.
 
   Vector3d vertex_mean() const;
   /// Distance from the mean of the vertices to the nearest face plane, m: a lower bound of the inscribed sphere's
