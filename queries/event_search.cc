@@ -191,10 +191,9 @@ void EventSearch::search(Judged& judged, int runs, const std::function<bool()>& 
     options.first_points = kLaterFirstPoints;
   } else {
     propose_from_other_touch(hypothesis, target);
-    if (hypothesis.kind != EventKind::kNothing || hypothesis.begins_otherwise) {
-      options.most_likely = most_likely(judged.object);
+    options.most_likely = most_likely(judged.object);
+    if (hypothesis.kind != EventKind::kNothing || hypothesis.begins_otherwise)
       options.give_up_below = best_ - kHopeless - std::log(hypothesis.prior);
-    }
   }
   TemperedResult found = tempered_posterior(target, options, stream_of(judged), context_.cancellation);
   if (options.first_run == 0) {
@@ -235,7 +234,7 @@ void EventSearch::note_evidence(Judged& judged, double log_evidence) {
   judged.log_bayes = log_evidence - (is_reference ? 0.0 : evidence_of_nothing(judged.object));
   judged.may_be_more.reset();
   if (judged.posterior.unfinished)
-    judged.may_be_more = std::max(0.0, most_likely(judged.object) - log_evidence);
+    judged.may_be_more = std::max(0.0, std::min(judged.posterior.at_most, most_likely(judged.object)) - log_evidence);
   else if (!judged.posterior.gave_up)
     best_ = std::max(best_, std::log(judged.hypothesis.prior) + log_evidence);
 }

@@ -3,6 +3,7 @@
 #include "prescene/queries/explain.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "candidate_objects.h"
@@ -22,6 +23,7 @@ namespace {
 
 using belief::EventKind;
 
+constexpr double kSearchShare = 0.85;       // of the time, if it is limited
 constexpr std::size_t kPointsInHaste = 24;  // of a posterior, that are worked out when the time is out
 
 class Explainer {
@@ -50,7 +52,8 @@ class Explainer {
     for (const std::size_t object : candidates) looked.note_when_seen(object);
     looked.look_for_peaks(candidates);
     const std::vector<Hypothesis> hypotheses = hypotheses_about(candidates, *events_, query_.weights, *tools_.meshes);
-    EventSearch search(*events_, *likelihood_, times_, query_, context_.simulation);
+    const QueryContext searching = context_of_search();
+    EventSearch search(*events_, *likelihood_, times_, query_, searching);
     PRESCENE_RETURN_IF_ERROR(search.run(candidates, hypotheses));
     PRESCENE_RETURN_IF_ERROR(events_->failure());
     JudgedEvents judged{window_, *events_, *likelihood_, times_, search.nothings(), search.judged(), chosen_};
@@ -73,6 +76,15 @@ class Explainer {
   }
 
  private:
+  /// What is found has to be simulated once more for the answer, in the same time.
+  QueryContext context_of_search() const {
+    QueryContext context = context_.simulation;
+    const auto now = core::Cancellation::Clock::now();
+    if (auto& until = context.simulate_until; until && *until > now)
+      until = now + std::chrono::duration_cast<core::Cancellation::Clock::duration>(kSearchShare * (*until - now));
+    return context;
+  }
+
   core::Status look_up_wanted() {
     if (!query_.change || (query_.wanted_name.empty() && !query_.wanted)) return core::ok_status();
     belief::AchieveQuery asked;

@@ -234,6 +234,10 @@ class TemperedSampler {
       }
       return sum * sum / squares;
     };
+    // What is to come is at most (1 - b) of the greatest gain, as N / q is at most one over the prior's share.
+    const auto reachable = [&] {
+      return run.log_evidence + (1.0 - run.b) * (options_.most_likely - std::log(Shares(target_).prior));
+    };
     const double wanted = options_.least_effective * static_cast<double>(n);
     double step = 1.0 - run.b;
     if (effective(step) < wanted && !last) {
@@ -242,15 +246,13 @@ class TemperedSampler {
       step = std::max(low, 1e-6);
     }
     const bool too_large = effective(step) < wanted && last;
+    if (too_large) at_most_ = std::max(at_most_, reachable());
     double sum = 0.0;
     for (const double w : weight) sum += w;
     run.log_evidence += step * top + std::log(sum / static_cast<double>(n));
     run.b = run.b + step >= 1.0 - 1e-9 ? 1.0 : run.b + step;
-    // What is to come is at most (1 - b) of the greatest gain, as N / q is at most one over the prior's share.
-    const double reachable =
-        run.log_evidence + (1.0 - run.b) * (options_.most_likely - std::log(Shares(target_).prior));
-    if (run.b < 1.0 && reachable < options_.give_up_below) {
-      run.log_evidence = reachable;
+    if (run.b < 1.0 && reachable() < options_.give_up_below) {
+      run.log_evidence = reachable();
       run.gave_up = true;
       run.z.resize(static_cast<std::size_t>(options_.points));
       run.log_l.resize(run.z.size());
@@ -330,6 +332,7 @@ class TemperedSampler {
     result.evaluations = evaluations_;
     result.cut_short = cut_short_;
     result.unfinished = unfinished_;
+    if (unfinished_) result.at_most = at_most_;
     std::vector<std::size_t> run_of;
     for (std::size_t r = 0; r < runs_.size(); ++r) {
       const Run& run = runs_[r];
@@ -351,6 +354,7 @@ class TemperedSampler {
   std::vector<Run> runs_;
   int evaluations_ = 0;
   bool cut_short_ = false, unfinished_ = false;
+  double at_most_ = -std::numeric_limits<double>::infinity();
 };
 
 }  // namespace

@@ -155,11 +155,13 @@ TEST(TemperedPosterior, EndsWhenTheTimeIsOut) {
   const int all_calls = std::exchange(calls, 0);
   TemperedOptions options;
   options.runs = 512;
+  options.most_likely = 0.0;
   options.out_of_time = [&] { return calls >= 1; };
   const TemperedResult in_one_step = tempered_posterior(target, options, stream);
   EXPECT_EQ(calls, 1);
   EXPECT_LT(calls, all_calls);
   EXPECT_TRUE(in_one_step.unfinished);
+  EXPECT_GE(in_one_step.at_most, searched.mean_log_evidence);
   EXPECT_FALSE(in_one_step.cut_short);
   EXPECT_NEAR(in_one_step.mean_log_evidence, -0.5 * std::log(401.0) - 0.5 * 400.0 / 401.0, 0.1);
   // Time enough changes no bit.

@@ -64,6 +64,8 @@ struct TemperedResult {
   bool cut_short = false;          ///< The last step of b was larger than the effective sample size allows.
   bool gave_up = false;            ///< A run did.
   bool unfinished = false;         ///< The time ran out before all runs were at b = 1.
+  /// Of what is unfinished, an upper bound of the log evidence: of the rest of b, by TemperedOptions::most_likely.
+  double at_most = std::numeric_limits<double>::infinity();
 };
 
 /// Sets where `found`, of the same target, has the posterior, somewhat wider. Runs that are proposed from there need
