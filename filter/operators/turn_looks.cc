@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -105,13 +106,15 @@ TurnFits fits_in(const TurnLook& look, RivalSearch& coarse, RivalSearch& fine, c
   const std::vector<rendering::PoseEvidence> evidence = fine.evaluate(X_WO);
   const Particle& followed = particles[turns.front().leader];
   const std::shared_ptr<const RestingShape> shape = tools.meshes->resting_shape(*look.target.mesh);
-  const StandingOdds odds(*shape, *look.target.mesh, *look.frame.surfaces, look.frame.up_W, followed.X_WO);
+  std::optional<StandingOdds> odds;
+  if (followed.mode == belief::MotionMode::kResting)
+    odds.emplace(*shape, *look.target.mesh, *look.frame.surfaces, look.frame.up_W, followed.X_WO);
   TurnFits fits;
   fits.pixels = std::max(kFewestRivalPixels, static_cast<double>(evidence[turns.front().leader].measured));
   fits.share = rendering::tempering(look.fine_terms.tempering.weight, fits.pixels, look.fine_terms.step);
   for (std::size_t i = 0; i < X_WO.size(); ++i) {
     TurnFit fit{X_WO[i], evidence[i], fits.share * evidence[i].log_ratio, look.prior.log(X_WO[i])};
-    if (followed.mode == belief::MotionMode::kResting) fit.log_stands = odds.log_of(X_WO[i]);
+    if (odds) fit.log_stands = odds->log_of(X_WO[i]);
     if (i >= particles.size() &&
         look.frame.surfaces->overlap(*look.target.mesh, X_WO[i], weighting.support_tolerance) > kMostInSupportOfRival)
       fit.log_frame = kNoEvidence;
