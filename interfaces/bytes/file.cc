@@ -45,6 +45,14 @@ Status write_error(const std::filesystem::path& path, int error) {
   return core::unavailable(path.string() + ": cannot be written: " + reason(error) + remedy);
 }
 
+/// Makes a file of a name that nothing has: 0, or the system's error.
+int make_empty(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor < 0) return errno;
+  ::close(descriptor);
+  return 0;
+}
+
 /// For locks that belong to an open file, not to the process: they go when it is closed.
 struct flock whole_file() {
   struct flock all {};
@@ -74,22 +82,17 @@ Result<std::filesystem::path> create_beside(const std::filesystem::path& path, c
     // Short, so that any name that a file may have leaves room for it.
     std::filesystem::path made = path;
     made.replace_filename(".prescene-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".partial");
-    const int descriptor = ::open(made.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (descriptor >= 0) {
-      ::close(descriptor);
-      return made;
-    }
-    if (errno != EEXIST) return write_error(named.empty() ? path : named, errno);
+    const int error = make_empty(made);
+    if (error == 0) return made;
+    if (error != EEXIST) return write_error(named.empty() ? path : named, error);
   }
   return write_error(named.empty() ? path : named, EEXIST);
 }
 
 Result<bool> create_new_file(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (descriptor < 0 && errno == EEXIST) return false;
-  if (descriptor < 0) return write_error(path, errno);
-  ::close(descriptor);
-  return true;
+  const int error = make_empty(path);
+  if (error != 0 && error != EEXIST) return write_error(path, error);
+  return error == 0;
 }
 
 Status write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
