@@ -165,11 +165,12 @@ constexpr std::size_t kMostDrawn = 20'000;
 void remark_on_large_surroundings(const belief::Scene& scene, const std::filesystem::path& path,
                                   interfaces::FileReport& report) {
   const auto look_at = [&](const std::string& key, const auto& body) {
-    const auto mesh = body.visual ? *body.visual : belief::collision_mesh(body.collision);
-    if (mesh.triangles.size() <= kMostDrawn) return;
+    const std::size_t triangles =
+        body.visual ? body.visual->triangles.size() : belief::collision_mesh(body.collision).triangles.size();
+    if (triangles <= kMostDrawn) return;
     report.remarks.push_back(
         {path.string(), 0, 0, key + "." + body.name,
-         "of its " + std::to_string(mesh.triangles.size()) + " triangles at most " + std::to_string(kMostDrawn) +
+         "of its " + std::to_string(triangles) + " triangles at most " + std::to_string(kMostDrawn) +
              " are drawn for what a camera should see, so that details are lost; things still rest "
              "on all of it",
          "give it parts, or a 'visual' mesh of fewer triangles, if small details matter"});
