@@ -159,8 +159,9 @@ struct ExplainAnswer {
 
 /// kInvalidInput for a query out of range, a wanted outcome that can't be, and a window without frames, kNotFound for
 /// an unknown object or outcome (with the nearest names), for one that is lost in the whole window, and where the
-/// belief holds no object; errors of the simulator and the renderer; kCancelled. From QueryContext::simulate_until on no
-/// search goes on: what was not searched to the end has an interval of all that it may be, and is named in the remarks.
+/// belief holds no object; errors of the simulator and the renderer; kCancelled. From QueryContext::simulate_until on
+/// no search goes on: what was not searched to the end has an interval of all that it may be, and is named in the
+/// remarks.
 core::Result<ExplainAnswer> explain(const ExplainWindow& window, const ExplainQuery& query,
                                     const ExplainContext& context);
 
