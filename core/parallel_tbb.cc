@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "own_threads.h"
 #include "prescene/core/check.h"
 #include "prescene/core/parallel.h"
 
@@ -41,8 +42,10 @@ int hardware_threads() { return std::max(1, static_cast<int>(std::thread::hardwa
 }  // namespace
 
 struct ThreadPool::Impl {
-  explicit Impl(int count) : threads(count), arena(count) {
-    if (count > hardware_threads()) {
+  Impl(int count, PoolPriority priority) : threads(count), arena(count) {
+    if (priority == PoolPriority::kLow) {
+      own.emplace(count, priority);
+    } else if (count > hardware_threads()) {
       more_than_hardware.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count));
     }
   }
@@ -50,12 +53,14 @@ struct ThreadPool::Impl {
   // TBB has one worker a hardware thread, and warns when an arena asks for more, unless it is configured otherwise.
   std::optional<tbb::global_control> more_than_hardware;
   tbb::task_arena arena;
+  // Workers of TBB serve all arenas, with one priority, and a block that one has begun holds it.
+  std::optional<OwnThreads> own;
 };
 
-ThreadPool::ThreadPool(int threads) {
+ThreadPool::ThreadPool(int threads, PoolPriority priority) {
   PRESCENE_CHECK(threads >= 0);
   if (threads == 0) threads = hardware_threads();
-  impl_ = std::make_unique<Impl>(possible_threads(threads));
+  impl_ = std::make_unique<Impl>(possible_threads(threads), priority);
 }
 
 ThreadPool::~ThreadPool() = default;
@@ -64,6 +69,7 @@ int ThreadPool::threads() const { return impl_->threads; }
 
 void ThreadPool::for_blocks(std::size_t count, std::size_t block,
                             const std::function<void(std::size_t, std::size_t)>& body) {
+  if (impl_->own) return impl_->own->for_blocks(count, block, body);
   PRESCENE_CHECK(block > 0);
   const std::size_t blocks = count / block + (count % block != 0);
   if (blocks <= 1) {

@@ -114,8 +114,7 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
     return raw->explain(question, context);
   };
   impl->worker = std::make_unique<QueryWorker>(
-      backends, std::max(1, backends.pool().threads() - 1), impl->settings.worker,
-      [raw] { return raw->tracker->belief(); }, on_answer);
+      backends, backends.pool().threads(), impl->settings.worker, [raw] { return raw->tracker->belief(); }, on_answer);
   impl->running = settings.tracker;
   impl->parameters = std::make_unique<ParameterTable>(
       service_parameters(*impl->scene, impl->settings, impl->parameter_hooks()), [raw] {

@@ -9,6 +9,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
+#include "prescene/core/thread_priority.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
 
@@ -64,7 +65,7 @@ void add_learned_seconds(core::TimeNs first_frame_ns, nlohmann::ordered_json& ob
 QueryWorker::QueryWorker(Backends& backends, int threads, const QueryWorkerSettings& settings,
                          std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer)
     : backends_(backends),
-      pool_(threads),
+      pool_(threads, core::PoolPriority::kLow),
       settings_(settings),
       default_seconds_(settings.default_seconds),
       most_seconds_(settings.most_seconds),
@@ -213,6 +214,7 @@ void QueryWorker::read(const std::string& question_json) {
 }
 
 void QueryWorker::simulate_questions() {
+  core::lower_thread_priority();
   for (;;) {
     std::shared_ptr<const Question> question;
     {

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/view/live_view.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <condition_variable>
 #include <map>
 #include <mutex>
@@ -15,6 +12,7 @@
 #include "json_fields.h"
 #include "picture_pace.h"
 #include "prescene/belief/json.h"
+#include "prescene/core/thread_priority.h"
 #include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/view/view_history.h"
 #include "question_ids.h"
@@ -28,10 +26,6 @@ using nlohmann::ordered_json;
 
 constexpr double kPicturesPerSecond = 15.0, kStripsPerSecond = 0.5, kIdlePerSecond = 0.5;
 constexpr std::size_t kMostLiveStrips = 64;
-constexpr int kViewNice = 10;  // who looks on does not take the processor from who tracks
-
-/// Of the calling thread; on Linux a thread has a priority of its own.
-void lower_priority() { static_cast<void>(setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kViewNice)); }
 
 }  // namespace
 
@@ -173,7 +167,7 @@ void LiveView::Impl::take(WebClient client, const std::string& op, const ordered
 }
 
 void LiveView::Impl::work() {
-  lower_priority();
+  core::lower_thread_priority();  // who looks on does not take the processor from who tracks
   for (;;) {
     std::optional<ShownStep> shown;
     std::optional<std::string> health_text;

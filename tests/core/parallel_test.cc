@@ -3,6 +3,8 @@
 #include "prescene/core/parallel.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
@@ -13,26 +15,45 @@
 #include <vector>
 
 #include "prescene/core/random.h"
+#include "prescene/core/thread_priority.h"
 
 namespace prescene::core {
 namespace {
 
 constexpr int kThreadCounts[] = {1, 2, 3, 8};
 
+TEST(ThreadPool, OfLowPriorityHasNiceThreadsAndLeavesThoseOfOthersAsTheyAre) {
+  const auto nice_of_this_thread = [] { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); };
+  const int usual = nice_of_this_thread();
+  ThreadPool low(3, PoolPriority::kLow), normal(3);
+  std::atomic<int> lowered = 0, as_before = 0;
+  // As a thread that answers questions does: it is the first to use a pool.
+  std::thread asks([&] {
+    lower_thread_priority();
+    low.for_each_index(300, [&](std::size_t) { lowered += nice_of_this_thread() >= 10 ? 1 : 0; });
+  });
+  asks.join();
+  normal.for_each_index(300, [&](std::size_t) { as_before += nice_of_this_thread() == usual ? 1 : 0; });
+  EXPECT_EQ(lowered, 300);
+  EXPECT_EQ(as_before, 300);
+}
+
 TEST(ThreadPool, VisitsEachIndexOnceInConsecutiveBlocks) {
   for (const int threads : kThreadCounts) {
-    ThreadPool pool(threads);
-    EXPECT_EQ(pool.threads(), threads);
-    for (const std::size_t count : {0UL, 1UL, 7UL, 64UL, 1000UL}) {
-      for (const std::size_t block : {1UL, 3UL, 64UL, 2000UL}) {
-        std::vector<std::atomic<int>> visits(count);
-        pool.for_blocks(count, block, [&](std::size_t begin, std::size_t end) {
-          EXPECT_EQ(begin % block, 0U);
-          EXPECT_LE(end, count);
-          EXPECT_TRUE(end - begin == block || end == count);
-          for (std::size_t i = begin; i < end; ++i) ++visits[i];
-        });
-        for (const auto& v : visits) ASSERT_EQ(v, 1) << threads << " threads, " << count << " by " << block;
+    for (const PoolPriority priority : {PoolPriority::kNormal, PoolPriority::kLow}) {
+      ThreadPool pool(threads, priority);
+      EXPECT_EQ(pool.threads(), threads);
+      for (const std::size_t count : {0UL, 1UL, 7UL, 64UL, 1000UL}) {
+        for (const std::size_t block : {1UL, 3UL, 64UL, 2000UL}) {
+          std::vector<std::atomic<int>> visits(count);
+          pool.for_blocks(count, block, [&](std::size_t begin, std::size_t end) {
+            EXPECT_EQ(begin % block, 0U);
+            EXPECT_LE(end, count);
+            EXPECT_TRUE(end - begin == block || end == count);
+            for (std::size_t i = begin; i < end; ++i) ++visits[i];
+          });
+          for (const auto& v : visits) ASSERT_EQ(v, 1) << threads << " threads, " << count << " by " << block;
+        }
       }
     }
   }

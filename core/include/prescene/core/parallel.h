@@ -12,11 +12,15 @@
 
 namespace prescene::core {
 
+/// Of low priority: threads of its own that get the processor after others that want it, as far as the system allows
+/// (nice 10), and that help no other pool. The thread that calls a loop works along at the priority that it has.
+enum class PoolPriority { kNormal, kLow };
+
 /// An arena of threads. Loops given the same arena share its threads; two arenas do not steal each other's.
 class ThreadPool {
  public:
   /// threads >= 1, or 0 for the number of the machine's hardware threads.
-  explicit ThreadPool(int threads = 0);
+  explicit ThreadPool(int threads = 0, PoolPriority priority = PoolPriority::kNormal);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;

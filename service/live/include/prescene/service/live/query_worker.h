@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Answers questions that come in as JSON, from snapshots of the belief, on two threads of its own: one reads questions,
 // answers `where` and `timeline` and refuses what it must; the other answers what has to be simulated, one question
-// after the other. So `where` never waits for a simulation.
+// after the other. So `where` never waits for a simulation. What is simulated takes as many threads as the filter,
+// which get the processor after the filter's (nice 10).
 #pragma once
 
 #include <atomic>
@@ -68,8 +69,7 @@ using AnswerSink = std::function<void(const std::string& answer)>;
 
 class QueryWorker {
  public:
-  /// `threads` of its own for simulating; `snapshot` gives the belief to ask, from any thread. All must outlive the
-  /// worker.
+  /// `threads` for simulating; `snapshot` gives the belief to ask, from any thread. All must outlive the worker.
   QueryWorker(Backends& backends, int threads, const QueryWorkerSettings& settings,
               std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer);
   /// Stops what is being answered and drops what waits.
