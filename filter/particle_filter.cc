@@ -12,6 +12,7 @@
 #include "prescene/filter/operators/rivals.h"
 #include "prescene/filter/operators/unknown_objects.h"
 #include "prescene/filter/operators/wander.h"
+#include "prescene/filter/proposals/frame_sampling.h"
 #include "prescene/geometry/symmetry.h"
 
 namespace prescene::filter {
@@ -33,6 +34,11 @@ bool is_turned_in_place(const Pose& a, const Pose& b, const SearchTarget& target
                         const geometry::SymmetryGroup& symmetry) {
   return (a * target.centre() - b * target.centre()).norm() < kOnePlace &&
          geometry::symmetric_angle(a, b, symmetry) >= kRivalTurn;
+}
+
+/// Whether new objects are looked for in a frame of this number: in the first frame of all, and every so many after it.
+bool looks_for_more(const AugmentOptions& options, std::uint64_t frame_number) {
+  return options.new_objects && (frame_number - 1) % static_cast<std::uint64_t>(std::max(1, options.new_every)) == 0;
 }
 
 /// Height of the lowest surface of a frame, against gravity from W's origin: that above which 98 % of the measured
@@ -283,9 +289,8 @@ void ParticleFilter::resample_all(FrameStep& step) {
 void ParticleFilter::look_for_more(FrameStep& step) {
   const AugmentOptions& options = settings_.augment;
   Belief& belief = step.belief();
-  // In the first frame of all, and every so many after it.
   if (!options.new_objects) return;
-  if ((step.frame_number() - 1) % static_cast<std::uint64_t>(std::max(1, options.new_every)) != 0) {
+  if (!looks_for_more(options, step.frame_number())) {
     step.result.counters.forgotten_objects = forget_unknown_objects(belief);
     return;
   }
@@ -355,12 +360,18 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   note("predict", result);
 
   FilterFrame frame;
+  const std::uint64_t number =
+      belief.cameras.empty() ? belief.step : frames_of(belief, observation.camera) + 1;  // note_frame() counts it
+  // A search of the whole frame asks so and so many nats of the frame as it usually is.
+  const bool is_searched = number == 1 || looks_for_more(settings_.augment, number);
+  const FrameSampling sampling = is_searched ? FrameSampling{.terms = settings_.frame.terms}
+                                             : sampled_for(belief, observation, settings_.frame, meshes_);
   frame_caches_.resize(static_cast<std::size_t>(belief::camera_count(*belief.scene)));
   smears_.resize(frame_caches_.size());
-  result.frame_status =
-      prepare_frame(belief.scene, observation, X_WG,
-                    {settings_.colors, learned_models(belief, settings_.frame.colors, observation.camera)},
-                    settings_.frame, tools_, frame_caches_[static_cast<std::size_t>(observation.camera)], &frame);
+  result.frame_status = prepare_frame(
+      belief.scene, observation, X_WG,
+      {settings_.colors, learned_models(belief, settings_.frame.colors, observation.camera)}, settings_.frame, tools_,
+      frame_caches_[static_cast<std::size_t>(observation.camera)], &frame, &sampling);
   if (!result.frame_status.ok()) {
     result.degraded |= kFrameRejected;
     if (first) belief.step = 0;  // the first look is still to be taken

@@ -110,10 +110,10 @@ enum class Limit { kScaled, kInFull };
 
 /// Nats per pixel of what is seen at a pose, if it would do as a find there of which `needed` is asked; else nothing.
 std::optional<double> evidence_of_find(const Pose& X_CO, const rendering::PoseEvidence& seen, double needed,
-                                       Limit limit, const rendering::FrameTerms& terms, const SearchTarget& target,
-                                       const AugmentOptions& options, const WeightOptions& weighting,
-                                       const FilterTools& tools) {
-  if (seen.log_ratio < options.accept_log_ratio || seen.hit_share() < kLeastHits) return std::nullopt;
+                                       Limit limit, double density, const rendering::FrameTerms& terms,
+                                       const SearchTarget& target, const AugmentOptions& options,
+                                       const WeightOptions& weighting, const FilterTools& tools) {
+  if (seen.log_ratio < density * options.accept_log_ratio || seen.hit_share() < kLeastHits) return std::nullopt;
   const double outline = outline_at(terms, target, X_CO, weighting, tools);
   const double scale = limit == Limit::kInFull
                            ? 1.0
@@ -160,7 +160,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
 
   const rendering::PoseEvidence& e = found.evidence;
   const double shown = e.in_view > 0 ? static_cast<double>(e.visible) / e.in_view : 0.0;
-  if (e.log_ratio < current.log_ratio + options.min_gain || shown < kLeastShown) return false;
+  if (e.log_ratio < current.log_ratio + frame.density * options.min_gain || shown < kLeastShown) return false;
   // Of a tracked object, the particles know that place better than a search of one frame.
   const double distance = (found.X_CO * target.centre() - X_CO * target.centre()).norm();
   const Pose X_WO = frame.X_WC * found.X_CO;
@@ -180,7 +180,7 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
   };
   if (in_solids(X_WO) > std::max(kMostOverlap, in_solids(last.X_WO))) return false;
   const auto as_find = [&](const Pose& at, const rendering::PoseEvidence& seen, double needed, Limit limit) {
-    return evidence_of_find(at, seen, needed, limit, terms, target, options, weighting, tools);
+    return evidence_of_find(at, seen, needed, limit, frame.density, terms, target, options, weighting, tools);
   };
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
   const double reach = std::max(0.10, options.reach_speed * unseen);

@@ -66,7 +66,7 @@ FineFrame sampled_fine(const FilterFrame& frame, const belief::Scene& scene, con
     input.background = supports.view();
   rendering::FrameTermsOptions options;
   options.target_width = camera.width;
-  options.tempering = frame.terms.tempering;
+  options.tempering = frame.tempering;
   rendering::FrameTerms& terms = fine.terms;
   PRESCENE_CHECK(make_frame_terms(input, options, frame.terms.model, &terms).ok());
   // The frame's own image may be a reduced one.

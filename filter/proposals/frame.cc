@@ -64,7 +64,8 @@ rendering::SensorModelOptions with_settings(rendering::SensorModelOptions option
 
 core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, const belief::Observation& observation,
                            std::span<const Pose> X_WG, const FrameColors& colors, const FrameOptions& options,
-                           const FilterTools& tools, FrameCache& cache, FilterFrame* frame) {
+                           const FilterTools& tools, FrameCache& cache, FilterFrame* frame,
+                           const FrameSampling* sampling) {
   const belief::RgbdFrame& rgbd = observation.frame;
   if (!rgbd.depth || rgbd.depth->empty())
     return core::invalid_input("the frame has no depth image: the filter needs one, colour is optional");
@@ -95,6 +96,8 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   frame->solids = *cache.surfaces;
   for (std::size_t i = 0; i < X_WG.size(); ++i) frame->solids.place(cache.robot[i], X_WG[i]);
   frame->stamp_ns = observation.stamp_ns;
+  frame->density = sampling != nullptr ? sampling->density : 1.0;
+  frame->tempering = options.terms.tempering;
   frame->X_WC = observation.X_WC;
   frame->X_CW = observation.X_WC.inverse();
   frame->up_W = scene->gravity_W.norm() > 1e-9 ? Vector3d(-scene->gravity_W.normalized()) : Vector3d::UnitZ();
@@ -119,7 +122,7 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
   if (!scene->supports.empty()) input.background = cache.supports.view();
   input.color_models = color_models;
   PRESCENE_RETURN_IF_ERROR(make_frame_terms(
-      input, options.terms,
+      input, sampling != nullptr ? sampling->terms : options.terms,
       rendering::SensorModel(with_settings(options.sensor, belief::depth_noise_of(*scene, observation.camera))),
       &frame->terms));
   // Only where supports are known is a missing return there evidence; elsewhere the view is open.

@@ -36,10 +36,11 @@ struct AugmentOptions {
   /// nats per pixel. A find is accepted only if the frame says at least this much for each visible pixel, with the
   /// outline taken into account. Range 0 to 10. Measured: docs/studies/tracking.md.
   double accept_evidence = 3.0;
-  /// nats. A find is accepted only if its log ratio (untempered) is at least this. Range 0 to 1000. Chosen.
+  /// nats. A find is accepted only if its log ratio (untempered, of the frame as it is usually sampled) is at least
+  /// this. Range 0 to 1000. Chosen.
   double accept_log_ratio = 40.0;
-  /// nats. A find is accepted only if its log ratio exceeds that of the believed pose by at least this. Range 0 to
-  /// 1000. Chosen.
+  /// nats. A find is accepted only if its log ratio (the same) exceeds that of the believed pose by at least this.
+  /// Range 0 to 1000. Chosen.
   double min_gain = 10.0;
   /// m/s. A place is out of reach if the object would have had to move there faster than this since it was last seen,
   /// and is more than 10 cm away. Range 0 to 10. Chosen.

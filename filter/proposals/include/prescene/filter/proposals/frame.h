@@ -37,6 +37,9 @@ struct FilterTools {
 
 struct FrameOptions {
   rendering::FrameTermsOptions terms;
+  /// pixels. Where the smallest thing in sight covers fewer of the reduced image, frames are sampled more densely than
+  /// terms.target_width says, up to every fourth pixel. Range 0 to 10000. Measured: docs/studies/tracking.md.
+  double enough_pixels = 60.0;
   /// The scene's depth_noise takes precedence.
   rendering::SensorModelOptions sensor;
   ColorLearningOptions colors;
@@ -46,6 +49,12 @@ struct FrameOptions {
 rendering::SensorModelOptions with_settings(rendering::SensorModelOptions options,
                                             const belief::DepthNoiseSettings& noise);
 
+/// How densely one frame is sampled.
+struct FrameSampling {
+  rendering::FrameTermsOptions terms;
+  double density = 1.0;  ///< Pixels where FrameOptions::terms would take one.
+};
+
 /// A frame, prepared.
 struct FilterFrame {
   core::TimeNs stamp_ns = 0;
@@ -54,6 +63,8 @@ struct FilterFrame {
   Vector3d up_W = Vector3d::UnitZ();                ///< Against gravity; W's z where there is none.
   std::vector<Pose> X_WG;                           ///< Of the robot's bodies, in the order of Scene::robot.
   rendering::FrameTerms terms;                      ///< With the supports as what is seen where no object is.
+  double density = 1.0;                             ///< Pixels of `terms` where FrameOptions::terms would take one.
+  rendering::TemperingOptions tempering;            ///< Of other images of the frame: that of FrameOptions::terms.
   geometry::DepthImage supports;                    ///< Their depth in terms.camera, 0 = none.
   geometry::DepthImage robot;                       ///< The same of the robot's bodies.
   std::shared_ptr<const SupportSurfaces> surfaces;  ///< Of the supports, where no object can be. Never null.
@@ -82,10 +93,11 @@ struct FrameColors {
 };
 
 /// Fails with kInvalidInput when the frame's sizes don't fit its camera, a pose is not finite, or there is no depth.
-/// X_WG.size() == scene->robot.size().
+/// X_WG.size() == scene->robot.size(). `sampling` null: as options.terms say.
 core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, const belief::Observation& observation,
                            std::span<const Pose> X_WG, const FrameColors& colors, const FrameOptions& options,
-                           const FilterTools& tools, FrameCache& cache, FilterFrame* frame);
+                           const FilterTools& tools, FrameCache& cache, FilterFrame* frame,
+                           const FrameSampling* sampling = nullptr);
 
 /// The target to look for, of a model of the scene.
 SearchTarget target_of(const belief::ObjectModel& model, const FilterFrame& frame, const FilterTools& tools);
