@@ -39,13 +39,10 @@ int possible_threads(int count) {
 
 int hardware_threads() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
 
-}  // namespace
-
-struct ThreadPool::Impl {
-  Impl(int count, PoolPriority priority) : threads(count), arena(count) {
-    if (priority == PoolPriority::kLow) {
-      own.emplace(count, priority);
-    } else if (count > hardware_threads()) {
+/// Of the workers that all pools share.
+struct SharedThreads {
+  explicit SharedThreads(int count) : threads(count), arena(count) {
+    if (count > hardware_threads()) {
       more_than_hardware.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count));
     }
   }
@@ -53,19 +50,32 @@ struct ThreadPool::Impl {
   // TBB has one worker a hardware thread, and warns when an arena asks for more, unless it is configured otherwise.
   std::optional<tbb::global_control> more_than_hardware;
   tbb::task_arena arena;
-  // Workers of TBB serve all arenas, with one priority, and a block that one has begun holds it.
+};
+
+}  // namespace
+
+/// One of both.
+struct ThreadPool::Impl {
+  Impl(int threads, PoolPriority priority) {
+    // Workers of TBB serve all arenas, with one priority, and a block that one has begun holds it.
+    if (priority == PoolPriority::kLow)
+      own.emplace(threads, priority);
+    else
+      shared.emplace(possible_threads(threads));
+  }
+  std::optional<SharedThreads> shared;
   std::optional<OwnThreads> own;
 };
 
 ThreadPool::ThreadPool(int threads, PoolPriority priority) {
   PRESCENE_CHECK(threads >= 0);
   if (threads == 0) threads = hardware_threads();
-  impl_ = std::make_unique<Impl>(possible_threads(threads), priority);
+  impl_ = std::make_unique<Impl>(threads, priority);
 }
 
 ThreadPool::~ThreadPool() = default;
 
-int ThreadPool::threads() const { return impl_->threads; }
+int ThreadPool::threads() const { return impl_->own ? impl_->own->threads() : impl_->shared->threads; }
 
 void ThreadPool::for_blocks(std::size_t count, std::size_t block,
                             const std::function<void(std::size_t, std::size_t)>& body) {
@@ -81,7 +91,7 @@ void ThreadPool::for_blocks(std::size_t count, std::size_t block,
   };
   // Isolated, so that a thread that waits for a nested loop does not start another block of the outer one: a body may
   // hold a workspace of its thread while it runs a loop.
-  impl_->arena.execute([&] {
+  impl_->shared->arena.execute([&] {
     tbb::this_task_arena::isolate([&] {
       tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, 1), run_blocks, tbb::simple_partitioner());
     });
