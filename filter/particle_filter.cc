@@ -360,8 +360,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   note("predict", result);
 
   FilterFrame frame;
-  const std::uint64_t number =
-      belief.cameras.empty() ? belief.step : frames_of(belief, observation.camera) + 1;  // note_frame() counts it
+  const std::uint64_t number = frames_of(previous, observation.camera) + 1;
   // A search of the whole frame asks so and so many nats of the frame as it usually is.
   const bool is_searched = number == 1 || looks_for_more(settings_.augment, number);
   const FrameSampling sampling = is_searched ? FrameSampling{.terms = settings_.frame.terms}

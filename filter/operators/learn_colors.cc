@@ -8,6 +8,7 @@
 #include "prescene/filter/operators/track_state.h"
 #include "prescene/filter/proposals/learned_colors.h"
 #include "prescene/filter/proposals/render_scene.h"
+#include "prescene/rendering/sensor/pixel_grid.h"
 
 namespace prescene::filter {
 namespace {
@@ -31,8 +32,8 @@ struct SampledView {
 /// What is believed to be in view.
 core::Status render_belief(const FilterFrame& frame, const geometry::PinholeCamera& full, const FilterTools& tools,
                            const belief::Belief& belief, SampledView* view) {
-  view->step = std::max(1, (2 * full.width + kColorWidth) / (2 * kColorWidth));
-  view->offset = std::min({view->step / 2, full.width - 1, full.height - 1});
+  view->step = rendering::pixel_step(full.width, kColorWidth);
+  view->offset = rendering::pixel_offset(view->step, full.width, full.height);
   view->camera = full.subsampled(view->step, view->offset);
   const BeliefView drawn = render_scene(belief, MeshDetail::kLikelihood, *tools.meshes);
   for (const belief::ObjectBelief& object : belief.objects) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "prescene/core/check.h"
+#include "prescene/rendering/sensor/pixel_grid.h"
 
 namespace prescene::filter {
 namespace {
@@ -47,8 +48,8 @@ FineFrame sampled_fine(const FilterFrame& frame, const belief::Scene& scene, con
                        const FilterTools& tools) {
   const belief::RgbdFrame& rgbd = observation.frame;
   FineFrame fine;
-  const int step = std::max(1, (2 * rgbd.camera.width + kFineWidth) / (2 * kFineWidth));
-  const int offset = std::min({step / 2, rgbd.camera.width - 1, rgbd.camera.height - 1});
+  const int step = rendering::pixel_step(rgbd.camera.width, kFineWidth);
+  const int offset = rendering::pixel_offset(step, rgbd.camera.width, rgbd.camera.height);
   const geometry::PinholeCamera camera = rgbd.camera.subsampled(step, offset);
   geometry::DepthImage depth(camera.width, camera.height), supports, robot;
   for (int y = 0; y < camera.height; ++y)

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "prescene/rendering/sensor/pixel_grid.h"
+
 namespace prescene::filter {
 namespace {
 
@@ -27,7 +29,7 @@ core::Status render_depth(const rendering::RenderScene& scene, const geometry::P
 
 /// The pixels of `full` that the reduced image of make_frame_terms shows.
 geometry::DepthImage sampled_like(const geometry::DepthImage& full, const rendering::FrameTerms& terms) {
-  const int offset = std::min({terms.step / 2, full.width() - 1, full.height() - 1});
+  const int offset = rendering::pixel_offset(terms.step, full.width(), full.height());
   geometry::DepthImage reduced(terms.camera.width, terms.camera.height);
   for (int y = 0; y < reduced.height(); ++y)
     for (int x = 0; x < reduced.width(); ++x) reduced(x, y) = full(offset + terms.step * x, offset + terms.step * y);

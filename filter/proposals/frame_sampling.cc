@@ -2,8 +2,9 @@
 #include "prescene/filter/proposals/frame_sampling.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
+
+#include "prescene/rendering/sensor/pixel_grid.h"
 
 namespace prescene::filter {
 namespace {
@@ -26,11 +27,6 @@ double covered_area(const rendering::RenderMesh& mesh) {
   if (box.isEmpty()) return 0.0;
   const Vector3d edges = box.sizes().cast<double>();
   return 0.5 * (edges.x() * edges.y() + edges.y() * edges.z() + edges.z() * edges.x());
-}
-
-/// As rendering::make_frame_terms has it.
-int spacing(int width, int target_width) {
-  return std::max(1, static_cast<int>((2LL * width + target_width) / (2LL * target_width)));
 }
 
 }  // namespace
@@ -56,7 +52,7 @@ FrameSampling sampled_for(const belief::Belief& belief, const belief::Observatio
     least = std::min(least, pixels);
     all += pixels;
   }
-  const int usual = spacing(camera.width, coarse);
+  const int usual = rendering::pixel_step(camera.width, coarse);
   int step = usual;
   while (step > kClosestSpacing && least < options.enough_pixels * step * step) {
     const int finer = std::max(kClosestSpacing, step / 2);
@@ -65,7 +61,7 @@ FrameSampling sampled_for(const belief::Belief& belief, const belief::Observatio
   }
   if (step == usual) return sampling;
   sampling.terms.target_width = std::max(coarse, camera.width / step);
-  step = spacing(camera.width, sampling.terms.target_width);  // not quite that at unusual widths
+  step = rendering::pixel_step(camera.width, sampling.terms.target_width);  // not quite that at unusual widths
   const double area = static_cast<double>(usual) * usual, finer_area = static_cast<double>(step) * step;
   sampling.density = area / finer_area;
   sampling.terms.tempering.weight.correlated_px2 += area - finer_area;

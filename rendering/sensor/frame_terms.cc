@@ -8,6 +8,7 @@
 #include "prescene/core/check.h"
 #include "prescene/rendering/portable_math.h"
 #include "prescene/rendering/sensor/likelihood_batch.h"
+#include "prescene/rendering/sensor/pixel_grid.h"
 
 namespace prescene::rendering {
 namespace {
@@ -133,9 +134,8 @@ core::Status make_frame_terms(const FrameTermsInput& input, const FrameTermsOpti
     return core::invalid_input("the background depth is " + size_text(input.background) + ", the camera " +
                                camera_size + ": it must be of the same view");
 
-  const int target = std::max(1, options.target_width);
-  const int step = std::max(1, (2 * input.camera.width + target) / (2 * target));
-  const int offset = std::min({step / 2, input.camera.width - 1, input.camera.height - 1});
+  const int step = pixel_step(input.camera.width, options.target_width);
+  const int offset = pixel_offset(step, input.camera.width, input.camera.height);
   terms->model = model;
   terms->tempering = options.tempering;
   terms->step = step;

@@ -8,6 +8,7 @@
 
 #include "prescene/core/clock.h"
 #include "prescene/core/text.h"
+#include "prescene/rendering/sensor/pixel_grid.h"
 #include "prescene/service/tracking/waiting_controls.h"
 
 namespace prescene::service {
@@ -96,8 +97,8 @@ queries::WindowFrame sampled_frame(const belief::Observation& observation, std::
                                    int width) {
   const belief::RgbdFrame& whole = observation.frame;
   // As rendering::make_frame_terms samples it, so that its pixels are just these.
-  const int step = std::max(1, (2 * whole.camera.width + width) / (2 * width));
-  const int offset = std::min({step / 2, whole.camera.width - 1, whole.camera.height - 1});
+  const int step = rendering::pixel_step(whole.camera.width, width);
+  const int offset = rendering::pixel_offset(step, whole.camera.width, whole.camera.height);
   queries::WindowFrame kept;
   kept.sampled = step;
   kept.belief = std::move(belief);
