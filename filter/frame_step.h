@@ -27,6 +27,7 @@ struct ParticleFilter::FrameStep {
   const FilterFrame& frame;
   const belief::Observation& observation;
   StepResult& result;
+  double dt = 0.0;  ///< Since the last frame of any camera, s; 0 in the first.
   // By object.
   std::vector<geometry::DepthImage> depths = {};  ///< What others may be hidden by.
   std::vector<WeightReport> reports = {};

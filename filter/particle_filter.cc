@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "frame_step.h"
 #include "prescene/belief/robot_motion.h"
@@ -27,6 +28,8 @@ constexpr double kIslandGap = 0.005;  // m; objects nearer than this form an isl
 // A support that was found in a frame is the average of what the first frames show of it, and follows later frames at
 // this rate. Chosen.
 constexpr double kLeastSupportGain = 0.1;
+constexpr std::uint64_t kLookForSupport =
+    10;                             // frames, after which one is looked for again where there is none; chosen
 constexpr double kOnePlace = 0.05;  // m
 
 /// Whether two poses differ by how the object is turned rather than by where it is.
@@ -77,23 +80,14 @@ std::vector<Pose> robot_poses(const Belief& belief, const belief::Observation& o
   return X_WG;
 }
 
-/// A frame of a camera that does not see what another one sees tells nothing of rest and motion: what would have begun
-/// to move, or come to rest, in the prediction to it goes on as it was.
-void keep_modes(const Belief& before, int camera, double dt, Belief& belief) {
-  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
-    ObjectBelief& object = belief.objects[i];
-    const std::vector<Particle>& were = before.objects[i].particles;
+/// By object: a frame of a camera that does not see what another one sees tells nothing of whether it rests or moves.
+std::vector<bool> seen_by_others(const Belief& belief, int camera) {
+  std::vector<bool> by_others;
+  for (const ObjectBelief& object : belief.objects) {
     const bool is_believed = object.state == TrackState::kTracked || object.state == TrackState::kDoubtful;
-    if (!is_believed || !was_unseen_by(before.objects[i], camera) || object.particles.size() != were.size()) continue;
-    for (std::size_t j = 0; j < were.size(); ++j) {
-      Particle& particle = object.particles[j];
-      const bool woke = were[j].mode == belief::MotionMode::kResting && particle.mode == belief::MotionMode::kMoving;
-      const bool settled = were[j].mode == belief::MotionMode::kMoving && particle.mode == belief::MotionMode::kResting;
-      if (woke || settled) particle = were[j];
-      if (settled) particle.X_WO.translation += dt * particle.V_WO.linear;
-    }
-    belief::normalize(object.particles);
+    by_others.push_back(!belief.cameras.empty() && is_believed && was_unseen_by(object, camera));
   }
+  return by_others;
 }
 
 }  // namespace
@@ -169,7 +163,8 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
   const bool first = belief.step == 1;
   const bool searches = first && std::any_of(belief.scene->objects.begin(), belief.scene->objects.end(),
                                              [](const auto& o) { return has_wide_prior(o); });
-  if (settings_.initialise.add_support && (belief.scene->supports.empty() || searches)) {
+  const bool has_none = belief.scene->supports.empty() && (first || belief.step % kLookForSupport == 0);
+  if (settings_.initialise.add_support && (has_none || searches)) {
     const core::RandomStream stream(belief.seed, core::Purpose::kDetection, 1);
     const std::vector<belief::Support> found =
         supports_from_frame(sampled, observation.X_WC, *belief.scene, settings_.initialise, meshes_, stream);
@@ -181,6 +176,7 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
   }
   if (const auto lowest = lowest_surface(sampled, observation.X_WC, belief.scene->gravity_W))
     belief.lowest_seen = std::min(*lowest, belief.lowest_seen.value_or(*lowest));
+  std::shared_ptr<belief::Scene> corrected;  // a copy for all supports, made for the first
   for (std::size_t i = 0; i < belief.scene->supports.size(); ++i) {
     const bool follows = is_found_support(belief.scene->supports[i].name);
     if (!follows && !reports_supports_) continue;
@@ -188,12 +184,12 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
     if (!measured) continue;
     if (follows) {
       const double gain = std::max(1.0 / static_cast<double>(belief.step), kLeastSupportGain);
-      auto scene = std::make_shared<belief::Scene>(*belief.scene);
-      correct_support(*measured, gain, scene->supports[i]);
-      belief.scene = std::move(scene);
+      if (!corrected) corrected = std::make_shared<belief::Scene>(*belief.scene);
+      correct_support(*measured, gain, corrected->supports[i]);
     }
     result.supports.push_back(*std::move(measured));
   }
+  if (corrected) belief.scene = std::move(corrected);
 }
 
 void ParticleFilter::first_look(FrameStep& step, FindWhich which) {
@@ -230,12 +226,12 @@ void ParticleFilter::recover_all(FrameStep& step) {
     const rendering::PoseEvidence current = report.particles[static_cast<std::size_t>(report.heaviest)].evidence;
     const core::RandomStream mine = stream.at(belief.step, static_cast<std::uint32_t>(i));
     counters.recoveries_tried += look ? 1 : 0;
-    const std::vector<Particle> before = look ? object.particles : std::vector<Particle>();
+    const std::optional<ObjectBelief> before = look ? std::optional(object) : std::nullopt;
     if (!look || !recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise,
                           tools_, mine, object)) {
       if (is_unseen) {
-        counters.hidden_proposed +=
-            wander_unseen(frame, terms, target, current, settings_.weight, settings_.initialise, tools_, mine, object);
+        counters.hidden_proposed += wander_unseen(frame, terms, target, current, step.dt, settings_.weight,
+                                                  settings_.initialise, tools_, mine, object);
       }
       if (object.frames_refuted > 0) {
         counters.hidden_proposed += propose_hidden(frame, terms, target, belief.scene->gravity_W, settings_.augment,
@@ -243,9 +239,10 @@ void ParticleFilter::recover_all(FrameStep& step) {
       }
       continue;
     }
-    if (object.state == TrackState::kTracked && is_turned_in_place(belief::heaviest(before).X_WO, step.heaviest(i).X_WO,
-                                                                   target, model_of(belief, i).symmetry)) {
-      object.particles = before;  // rivals of what is followed are weighed over frames
+    const Pose X_WO_before = belief::heaviest(before->particles).X_WO;
+    if (object.state == TrackState::kTracked &&
+        is_turned_in_place(X_WO_before, step.heaviest(i).X_WO, target, model_of(belief, i).symmetry)) {
+      object = *before;  // rivals of what is followed are weighed over frames
       continue;
     }
     ++counters.recoveries;
@@ -345,15 +342,14 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   std::vector<Island> islands;
   if (!first && !is_at_once) {
     islands = join_islands(belief, dt, result.counters);
-    PredictReport report =
-        predict(belief, control, X_WG, dt, settings_.predict, simulators_,
-                core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads(), islands);
+    PredictReport report = predict(belief, control, X_WG, dt, settings_.predict, simulators_,
+                                   core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads(),
+                                   islands, seen_by_others(belief, observation.camera));
     result.counters.pushed_particles = report.pushed;
     result.counters.simulated = report.simulated;
     result.counters.not_simulated = report.not_simulated;
     result.physics_failure = std::move(report.failure);
     if (report.not_simulated > 0) result.degraded |= kPhysicsFailed;
-    if (!belief.cameras.empty()) keep_modes(previous, observation.camera, dt, belief);
     hold_joints(belief);
   }
   belief.robot = X_WG;
@@ -381,7 +377,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   }
   if (observation.camera == 0) belief.X_WC = observation.X_WC;
   note_frame(observation, belief);
-  FrameStep current{frame, observation, result};
+  FrameStep current{frame, observation, result, dt};
   current.islands = std::move(islands);
   if (first || current.frame_number() == 1) first_look(current, first ? FindWhich::kAll : FindWhich::kLost);
   note("initialise", result);
@@ -393,7 +389,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   exchange_all(current);
   hold_joints(belief);
   learn_colors(frame, observation, current.reports, settings_.frame.colors, tools_, belief);
-  result.counters.inferred_releases = infer_releases(belief);
+  result.counters.inferred_releases = infer_releases(settings_.predict, belief);
   LearnReport learned = learn_physics(belief, settings_.learn_physics, simulators_, search_.threads());
   result.counters.physics_runs = learned.runs;
   result.counters.physics_lessons = learned.lessons;

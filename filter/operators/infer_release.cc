@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "prescene/filter/operators/predict.h"
+#include "falling_particles.h"
 #include "prescene/geometry/symmetry.h"
 
 namespace prescene::filter {
@@ -54,7 +54,7 @@ bool follow_grip(const belief::Belief& belief, const belief::ObjectBelief& objec
 
 }  // namespace
 
-int infer_releases(belief::Belief& belief) {
+int infer_releases(const PredictOptions& options, belief::Belief& belief) {
   int released = 0;
   for (std::size_t i = 0; i < belief.objects.size(); ++i) {
     belief::ObjectBelief& object = belief.objects[i];
@@ -68,7 +68,8 @@ int infer_releases(belief::Belief& belief) {
     scene->objects[i].held_by.reset();
     belief.scene = std::move(scene);
     object.grip = {};
-    for (belief::Particle& particle : object.particles) particle.mode = belief::MotionMode::kMoving;
+    for (belief::Particle& particle : object.particles)
+      if (particle.mode == belief::MotionMode::kHeld) wake(options, particle);
     ++released;
   }
   return released;

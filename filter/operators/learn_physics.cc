@@ -245,7 +245,9 @@ class Judge {
       const geometry::Vector3d up = -gravity.normalized();
       const geometry::Vector3d shift = d.tail<3>() - up * up.dot(d.tail<3>());
       const geometry::Vector3d p_WQ = first.X_WO * p_OQ_;
-      state.X_WO.rotation = (geometry::exp_rotation(up * d[2]) * first.X_WO.rotation).normalized();
+      // The deviations are those about the body's axes.
+      const geometry::Vector3d up_O = first.X_WO.rotation.conjugate() * up;
+      state.X_WO.rotation = (geometry::exp_rotation(up * up_O.dot(d.head<3>())) * first.X_WO.rotation).normalized();
       state.X_WO.translation = p_WQ + shift - state.X_WO.rotation * p_OQ_;
     } else {
       state.X_WO = geometry::normalized(geometry::box_plus(first.X_WO, d));

@@ -64,8 +64,16 @@ void begin_anew(const Pose& X_WO, MotionRecord& record) {
   record.recent.clear();
 }
 
+/// Stamps ascend: of cameras that take frames at one instant the last one counts.
+void append(const MotionSample& sample, std::vector<MotionSample>& samples) {
+  if (!samples.empty() && samples.back().stamp_ns == sample.stamp_ns)
+    samples.back() = sample;
+  else
+    samples.push_back(sample);
+}
+
 void keep_recent(const MotionSample& sample, MotionRecord& record) {
-  record.recent.push_back(sample);
+  append(sample, record.recent);
   const auto first = std::find_if(record.recent.begin(), record.recent.end(), [&](const MotionSample& kept) {
     return seconds_between(kept.stamp_ns, sample.stamp_ns) <= kBefore;
   });
@@ -95,7 +103,7 @@ MotionEpisode motion_episode(const belief::Belief& belief, const MotionSample& n
   MotionSample& start = episode.samples.front();
   start.X_WO = record.X_still;
   start.deviation = still_deviation(start.deviation, record.still_frames);
-  episode.samples.push_back(now);
+  append(now, episode.samples);
   return episode;
 }
 
@@ -177,11 +185,19 @@ void follow_motion(const belief::Belief& belief, int object, MotionRecord& recor
   }
   const bool moves = moved.tail<3>().norm() > std::max(kStartShift, 3.0 * now.deviation.tail<3>().maxCoeff()) ||
                      moved.head<3>().norm() > std::max(kStartTurn, 3.0 * now.deviation.head<3>().maxCoeff());
+  // It came here while nothing showed how.
+  const bool was_followed =
+      !record.recent.empty() && seconds_between(record.recent.back().stamp_ns, belief.stamp_ns) <= kLongestGap;
+  if (moves && !was_followed) {
+    begin_anew(now.X_WO, record);
+    keep_recent(now, record);
+    return;
+  }
   record.moved_frames = moves ? record.moved_frames + 1 : 0;
   const bool lay_still = record.still_frames >= kRestFrames;
   const bool moved_for_good = moves && (!lay_still || record.moved_frames >= kMovedFrames);
   if (record.episode && !judging) {
-    record.episode->samples.push_back(now);
+    append(now, record.episode->samples);
     const bool long_enough = seconds_between(record.episode->samples.front().stamp_ns, now.stamp_ns) >= kLongest;
     record.episode->closed = long_enough || (!moves && record.still_frames + 1 >= kRestFrames);
     if (record.episode->closed && std::ssize(record.episode->samples) < kFewestSamples) record.episode.reset();

@@ -276,7 +276,8 @@ void drift(Particle& particle, const Vector3d& p_OQ, double dt, double velocity_
 
 PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
                       const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                      const core::RandomStream& stream, core::ThreadPool& threads, std::span<const Island> islands) {
+                      const core::RandomStream& stream, core::ThreadPool& threads, std::span<const Island> islands,
+                      const std::vector<bool>& keeps_modes) {
   PRESCENE_CHECK(belief.objects.size() == belief.scene->objects.size());
   PRESCENE_CHECK(X_WG.size() == belief.scene->robot.size() && belief.robot.size() == X_WG.size());
   PRESCENE_CHECK(dt > 0.0);
@@ -297,7 +298,8 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
     std::vector<bool> smooth(object.particles.size(), false);
     const bool seen = tracked || object.state == belief::TrackState::kDoubtful;
-    change_modes(options, seen, tracked, hand.has_value(), static_cast<bool>(simulators), dt, draws, smooth, object);
+    if (i >= keeps_modes.size() || !keeps_modes[i])
+      change_modes(options, seen, tracked, hand.has_value(), static_cast<bool>(simulators), dt, draws, smooth, object);
     WorldsOfIsland* const island = worlds.of(i);
     if (island != nullptr) island->begin(i, released.has_value(), object);
     const Vector3d centre = centre_of(*belief.scene, object);

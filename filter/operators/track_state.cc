@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "motion_following.h"
+
 namespace prescene::filter {
 namespace {
 
@@ -127,9 +129,11 @@ void change_existence(double nats, ObjectBelief& object) {
 
 void nothing_sees(core::TimeNs stamp_ns, const TrackStateOptions& options, ObjectBelief& object) {
   ++object.frames_unseen;
-  object.frames_refuted = 0;
   object.evidence_per_pixel = 0.0;
   object.visible_share = 0.0;
+  // What was doubtful until now was seen, if not well.
+  if (object.state == TrackState::kDoubtful && object.frames_refuted == 0) object.last_seen_ns = stamp_ns;
+  object.frames_refuted = 0;
   const double unseen = 1e-9 * static_cast<double>(stamp_ns - object.last_seen_ns);
   if (object.state != TrackState::kLost)
     object.state = unseen > options.unseen_lost_after ? TrackState::kLost : TrackState::kUnseen;
@@ -199,6 +203,8 @@ void mark_unseen(const TrackedBy& by, const TrackStateOptions& options, ObjectBe
 }
 
 void mark_found(const TrackedBy& by, ObjectBelief& object) {
+  object.last_seen_ns = by.stamp_ns;
+  note_known_better(belief::heaviest(object.particles).X_WO, object.motion);  // it did not come here within a frame
   if (belief::CameraView* view = view_of(by, object)) show(Verdict{.sees = true}, *view);
 }
 

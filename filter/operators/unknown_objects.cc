@@ -240,6 +240,24 @@ int add_unknown_objects(const FilterFrame& frame, const belief::Observation& obs
   return added;
 }
 
+namespace {
+
+/// What is kept by the number of an object: of those behind the one that is gone the number is another now, so that
+/// runs of theirs could not be repeated.
+void forget_motion_of(std::size_t gone, belief::Belief& belief) {
+  for (std::size_t i = 0; i < belief.objects.size(); ++i) {
+    auto& episode = belief.objects[i].motion.episode;
+    if (!episode) continue;
+    if (i >= gone) {
+      episode.reset();
+    } else if (gone < episode->others.size()) {
+      episode->others.erase(episode->others.begin() + static_cast<std::ptrdiff_t>(gone));
+    }
+  }
+}
+
+}  // namespace
+
 int forget_unknown_objects(belief::Belief& belief) {
   const auto is_gone = [](const ObjectBelief& object) {
     return is_unknown_object(object.name) && object.state == belief::TrackState::kLost;
@@ -253,6 +271,7 @@ int forget_unknown_objects(belief::Belief& belief) {
     const auto at = static_cast<std::ptrdiff_t>(i);
     belief.objects.erase(belief.objects.begin() + at);
     scene->objects.erase(scene->objects.begin() + at);
+    forget_motion_of(i, belief);
     ++forgotten;
     // A model that the scene names, or that another object has, stays.
     const bool mine = is_unknown_object(scene->models[static_cast<std::size_t>(model)].name) &&

@@ -51,10 +51,10 @@ Particle left_alone(const SearchTarget& target, const Pose& X_still, const Initi
 }  // namespace
 
 int wander_unseen(const FilterFrame& frame, const rendering::FrameTerms& terms, const SearchTarget& target,
-                  const rendering::PoseEvidence& evidence, const WeightOptions& weighting,
+                  const rendering::PoseEvidence& evidence, double dt, const WeightOptions& weighting,
                   const InitialiseOptions& spread, const FilterTools& tools, const core::RandomStream& stream,
                   ObjectBelief& object) {
-  if (object.state != belief::TrackState::kUnseen || object.frames_unseen <= 0) return 0;
+  if (object.state != belief::TrackState::kUnseen) return 0;
   const bool is_known = object.motion.still_frames > 0;
   const Particle& leader = object.particles[leader_of(target, object.particles)];
   if (leader.mode == belief::MotionMode::kHeld) return 0;
@@ -64,7 +64,7 @@ int wander_unseen(const FilterFrame& frame, const rendering::FrameTerms& terms, 
       is_there ? evidence : evidence_of(terms, hypothesis(target, frame.X_CW * X_last), tools);
   if (there.measured - there.visible < kMostlyUnknown * there.in_view) return 0;
   const double unseen = 1e-9 * static_cast<double>(std::max<core::TimeNs>(0, frame.stamp_ns - object.last_seen_ns));
-  const double probability = 1.0 - std::exp(-unseen / object.frames_unseen / kMovedAfter);
+  const double probability = 1.0 - std::exp(-dt / kMovedAfter);
   core::RandomStream chances = stream.for_purpose(core::Purpose::kProcessNoise);
   std::vector<std::size_t> moved;
   for (std::size_t i = 0; i < object.particles.size(); ++i) {

@@ -25,7 +25,8 @@ constexpr int kMostSteps = 3;              // of a climb in one frame
 constexpr double kTurnError = 0.02;        // rad, of a measured turn: errors that all frames share
 constexpr double kKnownTurn = 0.01;        // rad; a turn that is known so well is measured no more
 constexpr double kOtherTurn = 0.12;        // rad; a rival nearer than this is no other
-constexpr double kMeasuredTurn = 0.25;     // rad; the turn of particles within this of the heaviest one is measured
+constexpr double kMeasuredTurn = 0.25;     // rad; the turn of particles within this of the heaviest one ...
+constexpr double kMeasuredShift = 0.02;    // m; ... and within this is measured with its
 constexpr double kPrinted = 1.0;           // nats from which on something is seen of the print
 constexpr double kStays = 0.5;             // no particle leaves a pose that is more probable than this
 constexpr double kLeastShare = 0.02;       // rivals that are less probable get no particle
@@ -119,6 +120,7 @@ void move_within_shape(const Pose& X_OS, Particle& particle) {
   to_new.topLeftCorner<3, 3>() = X_OS.rotation.conjugate().toRotationMatrix();
   to_new.block<3, 3>(3, 0) = -(particle.X_WO.rotation.toRotationMatrix() * geometry::cross_matrix(X_OS.translation));
   particle.covariance = to_new * belief::Matrix12d(particle.covariance) * to_new.transpose();
+  particle.V_WO = geometry::shifted(particle.V_WO, particle.X_WO.rotation * X_OS.translation);
   particle.X_WO = geometry::normalized(particle.X_WO * X_OS);
 }
 
@@ -228,19 +230,20 @@ bool spread_over(const std::vector<PrintRival>& rivals, const std::vector<std::s
 
 const PrintedModel* PrintCache::get(const belief::ObjectModel& model, MeshCache& meshes) {
   if (!model.look || !model.visual || model.surface != belief::SurfaceKind::kOpaque) return nullptr;
-  const auto [entry, is_new] = entries_.try_emplace({model.visual.get(), model.look.get()});
-  if (is_new) {
-    entry->second.visual = model.visual;
-    entry->second.look = model.look;
-    auto printed = std::make_unique<PrintedModel>();
-    printed->print = SurfacePrint(*meshes.get(model, MeshDetail::kDisplay), material_of(model.surface, model.color));
-    if (printed->print.says_anything()) {
-      printed->shape_symmetry =
-          model.symmetry.trivial() ? geometry::suggest_symmetry(*model.visual, kShapeTolerance) : model.symmetry;
-      entry->second.model = std::move(printed);
-    }
+  for (const auto& entry : entries_)
+    if (entry->visual == model.visual && entry->look == model.look && entry->color == model.color &&
+        entry->symmetry == model.symmetry)
+      return entry->model.get();
+  auto entry = std::make_unique<Entry>(Entry{model.visual, model.look, model.color, model.symmetry, nullptr});
+  auto printed = std::make_unique<PrintedModel>();
+  printed->print = SurfacePrint(*meshes.get(model, MeshDetail::kDisplay), material_of(model.surface, model.color));
+  if (printed->print.says_anything()) {
+    printed->shape_symmetry =
+        model.symmetry.trivial() ? geometry::suggest_symmetry(*model.visual, kShapeTolerance) : model.symmetry;
+    entry->model = std::move(printed);
   }
-  return entry->second.model.get();
+  entries_.push_back(std::move(entry));
+  return entries_.back()->model.get();
 }
 
 RivalLook rival_look(const WeighPrintOptions& options, const ObjectBelief& object, std::uint64_t frame, bool found) {
@@ -297,7 +300,7 @@ PrintReport weigh_print(const PrintedModel& printed, const FilterFrame& frame, c
         std::any_of(rivals.begin(), rivals.end(), [](const PrintRival& rival) { return rival.log_ratio >= kPrinted; });
     std::vector<std::size_t> members;
     for (std::size_t i = 0; i < object.particles.size(); ++i)
-      if (is_near(object.particles[i].X_WO, X_WO_best, kMeasuredTurn, kMeasuredTurn)) members.push_back(i);
+      if (is_near(object.particles[i].X_WO, X_WO_best, kMeasuredShift, kMeasuredTurn)) members.push_back(i);
     // Where a thing is printed otherwise, a wrong pose may agree a little by chance, and in every frame anew: a frame
     // is to decide by itself.
     if (any_printed && rivals.front().share < kStays) report.turned = spread_over(rivals, members, object);
@@ -309,12 +312,11 @@ PrintReport weigh_print(const PrintedModel& printed, const FilterFrame& frame, c
     if (const auto turn = measured_turn(score, symmetry, X_WO_now))
       for (Particle& particle : object.particles) {
         const Vector6d from = geometry::box_minus(particle.X_WO, X_WO_now);
-        if (from.head<3>().norm() > kMeasuredTurn || from.tail<3>().norm() > kMeasuredTurn) continue;
+        if (from.head<3>().norm() > kMeasuredTurn || from.tail<3>().norm() > kMeasuredShift) continue;
         measure(symmetry, turn->angle - symmetry.axis->dot(from.head<3>()), turn->variance, particle);
       }
   }
   const PrintMatch match = score.match(belief::heaviest(object.particles).X_WO);
-  report.correlation = match.correlation;
   report.log_ratio = match.log_ratio(score.independent());
   return report;
 }

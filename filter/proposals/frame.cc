@@ -73,26 +73,37 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
     return core::invalid_input("the frame has no depth image: the filter needs one, colour is optional");
   if (!observation.X_WC.is_finite())
     return core::invalid_input("the camera's pose is not finite: check the transform of its frame");
+  if (rgbd.color && !rgbd.color->empty() &&
+      (rgbd.color->width() != rgbd.depth->width() || rgbd.color->height() != rgbd.depth->height()))
+    return core::invalid_input("colour of " + std::to_string(rgbd.color->width()) + " x " +
+                               std::to_string(rgbd.color->height()) + " pixels with depth of " +
+                               std::to_string(rgbd.depth->width()) + " x " + std::to_string(rgbd.depth->height()) +
+                               ": the filter needs colour registered to the depth image");
   for (const Pose& pose : X_WG)
     if (!pose.is_finite()) return core::invalid_input("a robot body's pose is not finite: check its transforms");
   PRESCENE_RETURN_IF_ERROR(geometry::validate(rgbd.camera).at("the frame's camera"));
 
   const BeliefView known = known_surroundings(*scene, X_WG, MeshDetail::kSurroundings, *tools.meshes);
-  if (cache.scene != scene || !cache.surfaces) {
-    cache.surfaces = std::make_shared<const SupportSurfaces>(*scene, *tools.meshes);
+  // Scenes are copied where one thing of them changes.
+  const bool has_scene = cache.scene != nullptr;
+  const bool same_supports = has_scene && (cache.scene == scene || cache.scene->supports == scene->supports);
+  const bool same_robot = has_scene && (cache.scene == scene || cache.scene->robot == scene->robot);
+  if (!same_supports) cache.surfaces = std::make_shared<const SupportSurfaces>(*scene, *tools.meshes);
+  if (!same_robot) {
     cache.robot.assign(scene->robot.size(), {});
     for (std::size_t i = 0; i < scene->robot.size(); ++i) {
       const belief::KinematicBody& body = scene->robot[i];
       cache.robot[i].add(*tools.meshes->get(body.visual, body.collision, MeshDetail::kLikelihood), Pose::identity());
     }
   }
-  if (cache.scene != scene || !(cache.camera == rgbd.camera) || !(cache.X_WC == observation.X_WC)) {
+  cache.scene = nullptr;  // until it is known that all of it could be made
+  if (!same_supports || !(cache.camera == rgbd.camera) || !(cache.X_WC == observation.X_WC)) {
     PRESCENE_RETURN_IF_ERROR(render_depth(only(known, InstanceKind::kSupport), rgbd.camera, observation.X_WC,
                                           *tools.renderer, &cache.supports));
-    cache.scene = scene;
     cache.camera = rgbd.camera;
     cache.X_WC = observation.X_WC;
   }
+  cache.scene = scene;
 
   frame->surfaces = cache.surfaces;
   frame->solids = *cache.surfaces;

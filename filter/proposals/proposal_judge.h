@@ -77,8 +77,6 @@ class ProposalJudge {
   /// Of a find as it is at the end.
   FitNumbers numbers_of(const rendering::FrameTerms& terms, const Cluster& cluster, const Detection& found) const;
 
-  DetectionTrace* trace() const { return trace_; }
-
  private:
   Fit fit_of(int model, const Pose& X_CO, const rendering::PoseEvidence& evidence, const Cluster& cluster,
              bool stands) const;

@@ -293,32 +293,4 @@ double PrintView::independent_share(const Pose& X_CO) const {
   return 1.0 / std::max(1.0, correlated);
 }
 
-PrintLearner::PrintLearner(const rendering::RenderMesh& mesh) : surface_(mesh, rendering::SurfaceMaterial{}) {
-  sums_.assign(surface_.cells_.size(), 0.0F);
-  counts_.assign(surface_.cells_.size(), 0);
-}
-
-void PrintLearner::add(const geometry::PinholeCamera& camera, const geometry::DepthImage& depth,
-                       const geometry::ColorImage& color, const Pose& X_CO) {
-  const Pose X_OC = X_CO.inverse();
-  for (int y = 0; y < depth.height(); ++y)
-    for (int x = 0; x < depth.width(); ++x) {
-      const double z = depth(x, y);
-      if (!(z > 0.0)) continue;
-      const Vector3d p_O = X_OC * camera.unproject(x, y, z);
-      if (surface_.at(p_O) == 0) continue;
-      const Vector3d cell = (p_O - surface_.p_O_corner_) * surface_.per_metre_;
-      const std::size_t i =
-          surface_.index(static_cast<int>(cell.x()), static_cast<int>(cell.y()), static_cast<int>(cell.z()));
-      sums_[i] += static_cast<float>(luma(color(x, y)));
-      ++counts_[i];
-    }
-}
-
-SurfacePrint PrintLearner::print() const {
-  SurfacePrint learned = surface_;
-  learned.fill(sums_, counts_);
-  return learned;
-}
-
 }  // namespace prescene::filter

@@ -8,9 +8,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <mutex>
 
 #include "prescene/core/random.h"
 #include "tests/filter/pushed_box.h"
+#include "tests/support/fake_simulator.h"
 
 namespace prescene::filter_tests::learn_physics_test {
 namespace {
@@ -119,6 +121,68 @@ TEST_F(LearnPhysics, APushTellsFriction) {
   EXPECT_LT(learned.friction.low, push.friction);
   EXPECT_GT(learned.friction.high, push.friction);
   EXPECT_LT(learned.friction.high - learned.friction.low, 0.5 * 0.9 * 0.8);  // half of the prior's
+}
+
+// Two cameras that are triggered together give each instant two frames.
+TEST_F(LearnPhysics, APushTellsTheSameInFramesOfOneInstant) {
+  Push push;
+  push.friction = 0.3;
+  std::vector<Belief> twice;
+  for (const Belief& frame : tracked_push(push, 1, threads_)) twice.insert(twice.end(), 2, frame);
+  const Learned learned = learn(twice, 1, threads_);
+  EXPECT_EQ(learned.total.lessons, 1);
+  EXPECT_EQ(learned.total.unexplained, 0);
+  EXPECT_TRUE(holds(learned.friction, push.friction));
+}
+
+TEST_F(LearnPhysics, WhatReappearsElsewhereTeachesNothing) {
+  Push push;
+  push.speed = 0.0;
+  push.frames = 150;
+  std::vector<Belief> frames = tracked_push(push, 1, threads_);
+  for (std::size_t i = 60; i < frames.size(); ++i) {
+    if (i < 90) frames[i].objects[0].state = belief::TrackState::kUnseen;
+    for (belief::Particle& particle : frames[i].objects[0].particles) particle.X_WO.translation.y() += 0.1;
+  }
+  const Learned learned = learn(frames, 1, threads_);
+  EXPECT_EQ(learned.total.lessons, 0);
+  EXPECT_EQ(learned.total.unexplained, 0);
+  EXPECT_LE(learned.total.runs, 16) << "it lies in two places";
+}
+
+// What lies on its side is turned about gravity by what is unsure of that, however unsure its turn about its own axis
+// is.
+TEST_F(LearnPhysics, StartsAreTurnedAboutGravityAlone) {
+  constexpr double kUnsure = 0.03, kSure = 0.001;
+  const geometry::Quaterniond on_its_side = geometry::exp_rotation({0.0, M_PI / 2.0, 0.0});
+  std::vector<Belief> frames = tracked_push({}, 1, threads_);
+  for (Belief& frame : frames)
+    for (belief::Particle& particle : frame.objects[0].particles) {
+      particle.X_WO.rotation = on_its_side;
+      particle.covariance.diagonal().head<3>() << kSure * kSure, kSure * kSure, kUnsure * kUnsure;
+    }
+  std::mutex mutex;
+  double most = 0.0;
+  int starts = 0;
+  const simulation::SimulatorFactory simulators = [&](const belief::Scene&, double) {
+    return core::Result<std::unique_ptr<simulation::Simulator>>(std::make_unique<tests::FakeSimulator>(
+        [&](const belief::WorldState& start, const simulation::RunRequest&, core::RandomStream) {
+          const std::lock_guard lock(mutex);
+          ++starts;
+          const auto turn = on_its_side.conjugate() * start.objects[0].X_WO.rotation;
+          most = std::max(most, geometry::log_rotation(turn).norm());
+          return start;
+        }));
+  };
+  belief::ObjectBelief kept;
+  for (Belief& frame : frames) {
+    frame.objects[0].physics = kept.physics;
+    frame.objects[0].motion = kept.motion;
+    filter::learn_physics(frame, {}, simulators, threads_);
+    kept = frame.objects[0];
+  }
+  EXPECT_GT(starts, 100);
+  EXPECT_LT(most, 6.0 * kSure);
 }
 
 TEST_F(LearnPhysics, WhatNoFrictionExplainsChangesNothing) {

@@ -110,6 +110,21 @@ TEST_F(Predict, WhatWakesWeighsAsMuchAsThingsBeginToMove) {
   EXPECT_NEAR(moving_weight / kSteps, dt / 5.0, 0.05 * dt / 5.0);  // once in five seconds
 }
 
+TEST_F(Predict, WhatNothingNewIsSeenOfKeepsItsModesAndWeights) {
+  belief::Belief belief = hand_and_object(MotionMode::kResting, false);
+  for (std::size_t i = 0; i < 8; ++i) belief.objects[0].particles[i].mode = MotionMode::kMoving;
+  const Pose X_WG = belief.robot[0], poses[] = {X_WG};
+  const std::vector<bool> keeps = {true};
+  for (int step = 0; step < 100; ++step) {
+    ++belief.step;
+    predict(belief, {}, poses, 1.0 / 30.0, {}, {}, {3, core::Purpose::kProcessNoise}, threads_, {}, keeps);
+  }
+  for (std::size_t i = 0; i < 16; ++i) {
+    EXPECT_EQ(belief.objects[0].particles[i].mode, i < 8 ? MotionMode::kMoving : MotionMode::kResting) << i;
+    EXPECT_EQ(belief.objects[0].particles[i].log_weight, -std::log(16.0)) << i;
+  }
+}
+
 TEST_F(Predict, InAHandThatStandsStillItIsStill) {
   belief::Belief belief = hand_and_object(MotionMode::kHeld, true);
   const Pose X_WG = belief.robot[0];

@@ -7,6 +7,7 @@
 #include "filter_fixture.h"
 #include "prescene/core/random.h"
 #include "prescene/filter/operators/weigh_print.h"
+#include "prescene/geometry/angles.h"
 #include "printed_models.h"
 
 namespace prescene::filter_tests::printed_things_test {
@@ -15,7 +16,7 @@ namespace {
 using belief::Belief;
 using belief::TrackState;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
+using geometry::kDegree;
 const Vector3d kBox(0.07, 0.11, 0.15);
 
 Pose standing(double height, double turn) {
@@ -100,6 +101,22 @@ TEST(SurfacePrint, OfOneColourSaysNothing) {
   EXPECT_NE(prints.get(printed_can("can", 1), backends.meshes), nullptr);
   EXPECT_EQ(prints.get(can_model("can", 0.035, 0.11), backends.meshes), nullptr);
   EXPECT_EQ(PrintMatch{}.log_ratio(50.0), 0.0);
+}
+
+TEST(PrintCache, TellsModelsOfOneMeshApartBySymmetryAndColour) {
+  Backends backends;
+  PrintCache prints;
+  const belief::ObjectModel model = printed_can("can", 1);
+  belief::ObjectModel said = model, coloured = model;
+  said.symmetry = geometry::SymmetryGroup::cuboid();
+  coloured.color = {0.1, 0.2, 0.9};
+  const PrintedModel* first = prints.get(model, backends.meshes);
+  const PrintedModel* second = prints.get(said, backends.meshes);
+  ASSERT_TRUE(first != nullptr && second != nullptr);
+  EXPECT_EQ(second->shape_symmetry, said.symmetry);
+  EXPECT_NE(first, second);
+  EXPECT_NE(first, prints.get(coloured, backends.meshes));
+  EXPECT_EQ(first, prints.get(model, backends.meshes));
 }
 
 TEST(SurfacePrint, OfAnotherThingRefutesNoPose) {

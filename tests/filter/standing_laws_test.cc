@@ -8,6 +8,7 @@
 
 #include "filter_fixture.h"
 #include "prescene/filter/operators/standing.h"
+#include "prescene/geometry/angles.h"
 
 namespace prescene::filter_tests {
 namespace {
@@ -21,7 +22,7 @@ using filter::support_height;
 using filter::SupportHeight;
 using geometry::Matrix3d;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
+using geometry::kDegree;
 
 /// By a frame that shows the object at its pose, to `turn` rad and `shift` m in all directions.
 PoseEquations seen_to(double turn, double shift = 0.003) {

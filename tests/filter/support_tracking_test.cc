@@ -5,11 +5,12 @@
 #include <gtest/gtest.h>
 
 #include "filter_fixture.h"
+#include "prescene/geometry/angles.h"
 
 namespace prescene::filter_tests {
 namespace {
 
-constexpr double kDegree = 3.14159265358979 / 180.0;
+using geometry::kDegree;
 
 class TableOnTheMove : public ::testing::Test {
  protected:

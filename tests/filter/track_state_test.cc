@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "prescene/core/clock.h"
 #include "prescene/core/random.h"
 #include "prescene/filter/proposals/learned_colors.h"
 
@@ -155,6 +156,34 @@ TEST(TrackState, HiddenIsUnseenUntilItIsTooLong) {
   EXPECT_EQ(object.state, TrackState::kLost);
   filter::update_track(hidden, at(static_cast<core::TimeNs>(61.1e9)), options, object);
   EXPECT_EQ(object.state, TrackState::kLost);
+}
+
+TEST(TrackState, WhatWasDoubtfulForLongIsNotLostWhenItIsHidden) {
+  belief::ObjectBelief object;
+  filter::update_track(seen(5.0), at(0), {}, object);
+  for (int s = 1; s <= 100; ++s) filter::update_track(seen(2.0), at(s * core::ns_of(1.0)), {}, object);
+  ASSERT_EQ(object.state, TrackState::kDoubtful);
+  WeightReport hidden;
+  hidden.hidden_weight = 0.9;
+  filter::update_track(hidden, at(core::ns_of(100.1)), {}, object);
+  EXPECT_EQ(object.state, TrackState::kUnseen);
+  filter::update_track(hidden, at(core::ns_of(159.0)), {}, object);
+  EXPECT_EQ(object.state, TrackState::kUnseen);
+  filter::update_track(hidden, at(core::ns_of(161.0)), {}, object);
+  EXPECT_EQ(object.state, TrackState::kLost);
+}
+
+TEST(TrackState, WhatWasFoundIsSeenThereAndDidNotMoveThere) {
+  belief::ObjectBelief object;
+  object.particles.resize(1);
+  object.particles[0].X_WO.translation = {0.3, 0.0, 0.0};
+  object.motion.still_frames = 50;
+  filter::mark_found(at(core::ns_of(70.0)), object);
+  EXPECT_EQ(object.motion.X_still.translation, object.particles[0].X_WO.translation);
+  WeightReport hidden;
+  hidden.hidden_weight = 0.9;
+  filter::update_track(hidden, at(core::ns_of(70.1)), {}, object);
+  EXPECT_EQ(object.state, TrackState::kUnseen);
 }
 
 TEST(TrackState, ExistenceFallsWithContradictionAndRecovers) {

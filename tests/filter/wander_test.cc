@@ -108,14 +108,13 @@ TEST(WanderUnseen, NothingIsMovedThatIsSeenOrThatAKnownThingHides) {
     particle.X_WO = standing_can();
     particle.mode = belief::MotionMode::kResting;
   }
-  object.frames_unseen = 1;
   object.last_seen_ns = frame.stamp_ns - 1'000'000'000;
   rendering::PoseEvidence evidence;
   evidence.in_view = evidence.covered = evidence.measured = 40;
   const auto moved = [&] {
     belief::ObjectBelief copy = object;
-    return wander_unseen(frame, frame.terms, target, evidence, {}, {}, backends.tools, {6, core::Purpose::kRecovery},
-                         copy);
+    return wander_unseen(frame, frame.terms, target, evidence, 1.0, {}, {}, backends.tools,
+                         {6, core::Purpose::kRecovery}, copy);
   };
   object.state = belief::TrackState::kTracked;
   EXPECT_EQ(moved(), 0);

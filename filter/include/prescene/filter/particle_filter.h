@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The particle filter: five operators in a row, one frame after the other.
+// The particle filter: its operators in a row (predict, weight, resample, augment; in the first frame initialise), one
+// frame after the other.
 //
 //   ParticleFilter filter(likelihood, renderer, threads, settings);
 //   belief::Belief belief = filter.start(scene, seed);

@@ -60,8 +60,9 @@ struct AugmentOptions {
   bool new_objects = false;
   /// frames. New objects are looked for once in this many frames. Range 1 to 1000. Chosen.
   int new_every = 15;
-  /// nats. A new object is accepted only if its log ratio is at least this; smaller finds are more often remnants than
-  /// objects. Range 0 to 10000. Measured: docs/studies/tracking.md.
+  /// nats. A new object is accepted only if its log ratio is at least this (in the fine image of a sharp camera 30
+  /// less); smaller finds are more often remnants than objects. With --proposals, the learned judge decides instead.
+  /// Range 0 to 10000. Measured: docs/studies/tracking.md.
   double new_log_ratio = 250.0;
   /// nats. The same limit for things that no model describes, which get a shape fitted around their points. Range 0 to
   /// 10000. Chosen.

@@ -45,8 +45,8 @@ struct PredictOptions {
   /// share. An object that is not tracked keeps this share of its velocity over one second; with more it would drift
   /// away. Range 0 to 1. Measured: docs/studies/tracking.md.
   double unseen_velocity_keep = 2e-4;
-  /// probability. In each frame, a resting or held particle of a tracked object starts to move with this probability.
-  /// Range 0 to 1. Chosen.
+  /// probability. In each frame, a held particle of a tracked object starts to move with this probability, and a
+  /// resting one of an object that is tracked or doubtful with three times this probability. Range 0 to 1. Chosen.
   double wake_probability = 0.12;
   /// probability. In each frame, a moving particle of an object that the scene says is held moves with the hand again
   /// with this probability. Range 0 to 1. Chosen.
@@ -83,10 +83,12 @@ struct PredictReport {
 /// `islands`: those whose particles are worlds (checked). What moves in a world is simulated together, from where every
 /// member is in it, or not at all; what rests there and is pushed begins to move. In a step in which a member is
 /// released each is for itself.
+///
+/// `keeps_modes`: by object; those of which nothing new is seen, so that whatever their particles do they go on doing.
 PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
                       const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                      const core::RandomStream& stream, core::ThreadPool& threads,
-                      std::span<const Island> islands = {});
+                      const core::RandomStream& stream, core::ThreadPool& threads, std::span<const Island> islands = {},
+                      const std::vector<bool>& keeps_modes = {});
 
 /// One particle at constant velocity about the centre p_OQ for dt, its covariance grown by the noise.
 void drift(belief::Particle& particle, const Vector3d& p_OQ, double dt, double velocity_keep, const MotionNoise& noise);

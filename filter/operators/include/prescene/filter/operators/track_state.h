@@ -64,7 +64,8 @@ void update_track(const WeightReport& report, const TrackedBy& by, const TrackSt
 /// The same for a frame that showed nothing of it.
 void mark_unseen(const TrackedBy& by, const TrackStateOptions& options, belief::ObjectBelief& object);
 
-/// The camera's frame shows it where it was found just now; its evidence comes with the next frame.
+/// The camera's frame shows it where it was found just now; its evidence comes with the next frame. That it is
+/// elsewhere is no motion that anything is learned from.
 void mark_found(const TrackedBy& by, belief::ObjectBelief& object);
 
 }  // namespace prescene::filter

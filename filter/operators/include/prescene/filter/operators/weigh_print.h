@@ -47,12 +47,15 @@ class PrintCache {
   const PrintedModel* get(const belief::ObjectModel& model, MeshCache& meshes);
 
  private:
+  /// What a print is made of. It keeps mesh and look alive, so that their addresses stay their names.
   struct Entry {
     belief::MeshPtr visual;
     geometry::LookPtr look;
+    belief::Color color;
+    geometry::SymmetryGroup symmetry;
     std::unique_ptr<const PrintedModel> model;
   };
-  std::map<std::pair<const geometry::TriangleMesh*, const geometry::MeshLook*>, Entry> entries_;
+  std::vector<std::unique_ptr<const Entry>> entries_;
 };
 
 /// How far the rivals of an object's pose are known to be wrong.
@@ -66,9 +69,8 @@ RivalLook rival_look(const WeighPrintOptions& options, const belief::ObjectBelie
                      bool found);
 
 struct PrintReport {
-  double correlation = 0.0;  ///< PrintMatch of the heaviest particle.
-  double log_ratio = 0.0;    ///< Of the heaviest particle, nats.
-  bool turned = false;       ///< Particles were moved to a rival.
+  double log_ratio = 0.0;  ///< Of the heaviest particle, nats.
+  bool turned = false;     ///< Particles were moved to a rival.
 };
 
 /// The poses that a shape's symmetry takes for X_WO: 72 turns about a continuous axis. Without X_WO itself; nothing of

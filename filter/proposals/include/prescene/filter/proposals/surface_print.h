@@ -47,7 +47,6 @@ class SurfacePrint {
   double radius() const { return radius_; }         ///< Of that sphere, m.
 
  private:
-  friend class PrintLearner;
   std::size_t index(int x, int y, int z) const {
     return (static_cast<std::size_t>(z) * static_cast<std::size_t>(size_[1]) + static_cast<std::size_t>(y)) *
                static_cast<std::size_t>(size_[0]) +
@@ -113,21 +112,6 @@ class PrintView {
   int width_ = 0, height_ = 0;
   std::vector<Vector3d> points_C_;  ///< z = 0 where nothing was measured.
   std::vector<float> brightness_;
-};
-
-/// A print learned from frames: what they show of an object at poses that are known.
-class PrintLearner {
- public:
-  explicit PrintLearner(const rendering::RenderMesh& mesh);
-  /// What is within a few millimetres of the surface at X_CO.
-  void add(const geometry::PinholeCamera& camera, const geometry::DepthImage& depth, const geometry::ColorImage& color,
-           const Pose& X_CO);
-  SurfacePrint print() const;
-
- private:
-  SurfacePrint surface_;  ///< Its cubes are not 0 near the surface.
-  std::vector<float> sums_;
-  std::vector<std::uint32_t> counts_;
 };
 
 }  // namespace prescene::filter
