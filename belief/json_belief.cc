@@ -248,6 +248,13 @@ Json to_json(const std::vector<JointEstimate>& estimates) {
   return json;
 }
 
+Json to_json(const std::vector<AlternativePose>& alternatives) {
+  Json json = Json::array();
+  for (const AlternativePose& other : alternatives)
+    json.push_back({{"pose", to_json(other.X_WO)}, {"probability", other.probability}});
+  return json;
+}
+
 Json to_json(const Belief& belief) {
   Json objects = Json::array(), robot = Json::array();
   for (const ObjectBelief& object : belief.objects) objects.push_back(to_json(object));

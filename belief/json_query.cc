@@ -260,7 +260,8 @@ struct AnswerJson {
                        {"existence", item.existence},
                        {"parameters", to_json(item.parameters)},
                        {"lessons", item.lessons},
-                       {"learned_ns", item.learned_ns}});
+                       {"learned_ns", item.learned_ns},
+                       {"alternatives", to_json(item.alternatives)}});
     Json json{{"items", std::move(items)}};
     if (!where.joints.empty()) json["joints"] = to_json(where.joints);
     return json;

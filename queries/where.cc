@@ -35,7 +35,7 @@ core::Result<belief::WhereAnswer> where(const belief::Belief& belief, const beli
     const belief::ObjectModel& model = belief::model_of(belief, object);
     answer.items.push_back({object.name, model.name, belief::estimate(belief, object), object.state, object.existence,
                             belief::parameter_estimates(model, object.physics), object.physics.lessons,
-                            object.physics.learned_ns});
+                            object.physics.learned_ns, belief::alternative_poses(belief, object)});
   }
   if (query.object && answer.items.empty()) return no_such(*query.object, known);
   if (belief.scene) answer.joints = joints_of(*belief.scene, belief::joint_estimates(belief), query);

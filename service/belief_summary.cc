@@ -79,6 +79,18 @@ void read_learned(const ordered_json& json, ObjectSummary& object) {
 }
 
 /// What is not of the form is left out.
+void read_alternatives(const ordered_json& json, ObjectSummary& object) {
+  const auto alternatives = json.find("alternatives");
+  if (alternatives == json.end() || !alternatives->is_array()) return;
+  for (const ordered_json& item : *alternatives) {
+    if (object.alternatives.size() >= belief::kMostAlternatives) return;
+    if (!item.is_object() || !item.contains("pose")) continue;
+    if (const auto pose = belief::pose_from_json(item["pose"]))
+      object.alternatives.push_back({*pose, number_or(item, "probability", 0.0)});
+  }
+}
+
+/// What is not of the form is left out.
 void read_joints(const ordered_json& json, BeliefSummary& summary) {
   constexpr std::size_t kMostJoints = 1024;
   if (!json.is_array()) return;
@@ -125,7 +137,6 @@ core::Result<ObjectSummary> object_from_json(const ordered_json& json) {
   object.existence = number_or(json, "existence", 0.0);
   object.evidence_per_pixel = number_or(json, "evidence_per_pixel", 0.0);
   object.visible_share = number_or(json, "visible_share", 0.0);
-  read_learned(json, object);
   const auto covariance = json.find("covariance");
   if (covariance != json.end() && covariance->is_array() && covariance->size() == 36) {
     for (Eigen::Index i = 0; i < 36; ++i) {
@@ -134,6 +145,7 @@ core::Result<ObjectSummary> object_from_json(const ordered_json& json) {
     }
   }
   read_learned(json, object);
+  read_alternatives(json, object);
   if (const auto size = json.find("size"); size != json.end() && size->is_array() && size->size() == 3) {
     object.is_new = true;
     for (Eigen::Index i = 0; i < 3; ++i) {
@@ -155,6 +167,7 @@ BeliefSummary summary_of(const belief::Belief& belief) {
                                estimate.mean, estimate.covariance, estimate.twist, object.evidence_per_pixel,
                                object.visible_share, belief::parameter_estimates(model, object.physics),
                                object.physics.lessons, object.physics.learned_ns});
+    summary.objects.back().alternatives = belief::alternative_poses(belief, object);
     if (!filter::is_unknown_object(object.name)) continue;
     summary.objects.back().is_new = true;
     summary.objects.back().size = box_of(model).sizes();
@@ -180,7 +193,8 @@ ordered_json to_json(const BeliefSummary& summary) {
                        {"visible_share", object.visible_share},
                        {"parameters", belief::to_json(object.parameters)},
                        {"lessons", object.lessons},
-                       {"learned_ns", object.learned_ns}});
+                       {"learned_ns", object.learned_ns},
+                       {"alternatives", belief::to_json(object.alternatives)}});
     if (object.is_new) objects.back()["size"] = {object.size.x(), object.size.y(), object.size.z()};
   }
   ordered_json json{{"step", summary.step}, {"stamp_ns", summary.stamp_ns}, {"objects", objects}};
@@ -259,44 +273,73 @@ void add_marker_meshes(const belief::Scene& scene, MarkerMeshes& meshes) {
   }
 }
 
+namespace {
+
+interfaces::RosMarker mesh_marker(const geometry::TriangleMesh& mesh, const geometry::Pose& X_WO,
+                                  const belief::Color& color, float opacity, interfaces::RosMarker marker) {
+  marker.type = static_cast<std::int32_t>(interfaces::RosMarkerType::kTriangleList);
+  marker.pose = interfaces::to_ros_pose(X_WO);
+  marker.scale = {1.0, 1.0, 1.0};
+  marker.color = {static_cast<float>(color.r), static_cast<float>(color.g), static_cast<float>(color.b), opacity};
+  for (const auto& triangle : mesh.triangles) {
+    for (const std::uint32_t corner : triangle) {
+      const geometry::Vector3d& p = mesh.vertices[corner];
+      marker.points.push_back({p.x(), p.y(), p.z()});
+    }
+  }
+  return marker;
+}
+
+/// What is improbable is drawn all but transparent.
+float ghost_opacity(double probability) { return static_cast<float>(0.1 + 0.4 * std::clamp(probability, 0.0, 1.0)); }
+
+interfaces::RosMarker deleted(interfaces::RosMarker marker) {
+  marker.action = static_cast<std::int32_t>(interfaces::RosMarkerAction::kDelete);
+  return marker;
+}
+
+}  // namespace
+
 interfaces::RosMarkerArray markers_of(const BeliefSummary& summary, const belief::Scene& scene,
                                       const MarkerMeshes& meshes, const std::string& world_frame) {
   interfaces::RosMarkerArray array;
-  std::int32_t id = 0;
+  std::int32_t id = 0, ghost_id = 0;
   for (const ObjectSummary& object : summary.objects) {
     const belief::ObjectModel* model = model_of(scene, object.model);
+    const bool is_shown = model != nullptr && object.state != belief::TrackState::kLost;
     interfaces::RosMarker marker;
     marker.header = header_of(summary.stamp_ns, world_frame);
     marker.ns = "prescene";
     marker.id = id++;
     interfaces::RosMarker label = marker;
     label.id = id++;
-    if (!model || object.state == belief::TrackState::kLost) {
-      marker.action = label.action = static_cast<std::int32_t>(interfaces::RosMarkerAction::kDelete);
-      array.markers.push_back(marker);
-      array.markers.push_back(label);
+    // Each of its ghosts has a number, so that one that is gone is removed.
+    for (std::size_t i = 0; i < belief::kMostAlternatives; ++i) {
+      interfaces::RosMarker ghost = marker;
+      ghost.ns = "prescene/alternatives";
+      ghost.id = ghost_id++;
+      if (!is_shown || i >= object.alternatives.size()) {
+        array.markers.push_back(deleted(std::move(ghost)));
+        continue;
+      }
+      const belief::AlternativePose& other = object.alternatives[i];
+      array.markers.push_back(mesh_marker(meshes.at(model->name), other.X_WO, model->color,
+                                          ghost_opacity(other.probability), std::move(ghost)));
+    }
+    if (!is_shown) {
+      array.markers.push_back(deleted(std::move(marker)));
+      array.markers.push_back(deleted(std::move(label)));
       continue;
     }
     const geometry::TriangleMesh& mesh = meshes.at(model->name);
-    marker.type = static_cast<std::int32_t>(interfaces::RosMarkerType::kTriangleList);
-    marker.pose = interfaces::to_ros_pose(object.X_WO);
-    marker.scale = {1.0, 1.0, 1.0};
     const float opacity = object.state == belief::TrackState::kTracked ? 1.0F : 0.4F;
-    marker.color = {static_cast<float>(model->color.r), static_cast<float>(model->color.g),
-                    static_cast<float>(model->color.b), opacity};
-    for (const auto& triangle : mesh.triangles) {
-      for (const std::uint32_t corner : triangle) {
-        const geometry::Vector3d& p = mesh.vertices[corner];
-        marker.points.push_back({p.x(), p.y(), p.z()});
-      }
-    }
     label.type = static_cast<std::int32_t>(interfaces::RosMarkerType::kText);
-    label.pose = marker.pose;
+    label.pose = interfaces::to_ros_pose(object.X_WO);
     label.pose.position.z += geometry::radius_about(mesh, geometry::Vector3d::Zero());
     label.scale = {0.0, 0.0, 0.03};
     label.color = {1.0F, 1.0F, 1.0F, 1.0F};
     label.text = object.name + " (" + belief::to_string(object.state) + ")";
-    array.markers.push_back(std::move(marker));
+    array.markers.push_back(mesh_marker(mesh, object.X_WO, model->color, opacity, std::move(marker)));
     array.markers.push_back(std::move(label));
   }
   return array;

@@ -30,7 +30,17 @@ std::vector<ReportSection> sections_of(const belief::WhereAnswer& answer, const 
                           in_degrees(std::sqrt(P.topLeftCorner<3, 3>().trace())), percent(item.existence),
                           percent(item.estimate.confidence)});
   }
-  return {{"Where everything is", {std::move(table)}}};
+  ReportSection section{"Where everything is", {std::move(table)}};
+  std::string elsewhere;
+  for (const belief::WhereAnswer::Item& item : answer.items)
+    for (const belief::AlternativePose& other : item.alternatives)
+      elsewhere +=
+          (elsewhere.empty() ? "It may be otherwise: " : "; ") + item.object + " at " +
+          position_text(other.X_WO.translation) + " m, turned by " +
+          in_degrees(geometry::log_rotation(item.estimate.mean.rotation.conjugate() * other.X_WO.rotation).norm()) +
+          "°, with " + percent(other.probability);
+  if (!elsewhere.empty()) section.blocks.push_back(TextBlock{elsewhere + "."});
+  return {std::move(section)};
 }
 
 std::vector<ReportSection> sections_of(const belief::StabilityAnswer& answer, const belief::Scene&) {

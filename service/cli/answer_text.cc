@@ -60,6 +60,24 @@ std::string learned_text(const nlohmann::ordered_json& item) {
          ":\n" + text;
 }
 
+/// Where else an object may be, a line each; "" = nowhere.
+std::string alternatives_text(const nlohmann::ordered_json& item) {
+  std::string text;
+  const auto alternatives = item.find("alternatives");
+  if (alternatives == item.end()) return text;  // of a service of another version
+  const auto mean = belief::pose_from_json(item.at("estimate").at("mean"));
+  for (const auto& other : *alternatives) {
+    const auto pose = belief::pose_from_json(other.at("pose"));
+    if (!mean || !pose) continue;
+    const double turn = geometry::log_rotation(mean->rotation.conjugate() * pose->rotation).norm();
+    text += item.value("object", "") + ", with " + fixed_text(other.value("probability", 0.0), 2) + ": at " +
+            fixed_text(pose->translation.x(), 3) + " " + fixed_text(pose->translation.y(), 3) + " " +
+            fixed_text(pose->translation.z(), 3) + ", turned by " + fixed_text(turn * geometry::kDegreesPerRadian, 0) +
+            " degrees\n";
+  }
+  return text;
+}
+
 /// "slide at 0.213 +- 0.002 m", a line each; "" = there is none.
 std::string joints_text(const nlohmann::ordered_json& where) {
   std::string text;
@@ -127,7 +145,7 @@ std::string short_form(const nlohmann::ordered_json& answer) {
   }
   if (const auto where = answer.find("where"); where != answer.end()) {
     std::vector<std::vector<std::string>> rows = {{"object", "state", "confidence", "position, m"}};
-    std::string learned;
+    std::string learned, elsewhere;
     for (const auto& item : where->at("items")) {
       const auto& p = item.at("estimate").at("mean").at("position");
       rows.push_back({item.value("object", ""), item.value("state", ""),
@@ -135,8 +153,9 @@ std::string short_form(const nlohmann::ordered_json& answer) {
                       fixed_text(p.at(0).get<double>(), 3) + " " + fixed_text(p.at(1).get<double>(), 3) + " " +
                           fixed_text(p.at(2).get<double>(), 3)});
       learned += learned_text(item);
+      elsewhere += alternatives_text(item);
     }
-    return table(rows) + joints_text(*where) + learned;
+    return table(rows) + elsewhere + joints_text(*where) + learned;
   }
   return document_text(answer);
 }

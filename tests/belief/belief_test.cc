@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
+#include "prescene/belief/alternative_poses.h"
 #include "prescene/core/sobol.h"
 #include "tests/belief/random_values.h"
 #include "tests/support/laws.h"
@@ -159,6 +161,63 @@ TEST(Estimate, IsNotSureOfAnObjectThatMayBeTurned) {
   // Half of the weight is half a turn away: what is published is one of the two, not their mean.
   EXPECT_NEAR(estimate(turned_particles({0.0, 3.0})).confidence, 0.5, 0.01);
   EXPECT_NEAR(estimate(turned_particles({0.0, 0.0, 0.0, 1.0})).confidence, 0.75, 0.03);
+}
+
+/// Of six particles three stand here, two are turned by half a turn about z, one is 30 cm away.
+ObjectBelief three_groups() {
+  ObjectBelief object;
+  const std::array<double, 6> weights = {0.3, 0.2, 0.1, 0.15, 0.1, 0.15};
+  object.particles.resize(weights.size());
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    Particle& particle = object.particles[i];
+    particle.log_weight = std::log(weights[i]);
+    particle.X_WO.translation = {i == 5 ? 0.3 : 0.001 * static_cast<double>(i), 0.0, 0.0};
+    if (i == 3 || i == 4) particle.X_WO.rotation = geometry::exp_rotation({0.0, 0.0, M_PI});
+  }
+  return object;
+}
+
+TEST(AlternativePoses, AreTheOtherGroupsWithTheirShares) {
+  ObjectBelief object = three_groups();
+  object.existence = 0.9;
+  const auto alternatives = alternative_poses(object, geometry::SymmetryGroup::none());
+  ASSERT_EQ(alternatives.size(), 2U);
+  EXPECT_NEAR(alternatives[0].probability, 0.9 * 0.25, 1e-12);
+  EXPECT_NEAR(alternatives[0].X_WO.translation.x(), (0.15 * 0.003 + 0.1 * 0.004) / 0.25, 1e-9);
+  EXPECT_NEAR(alternatives[1].probability, 0.9 * 0.15, 1e-12);
+  EXPECT_NEAR(alternatives[1].X_WO.translation.x(), 0.3, 1e-12);
+  // What looks alike is no alternative.
+  const auto symmetry = geometry::SymmetryGroup::continuous(Vector3d::UnitZ(), false);
+  ASSERT_EQ(alternative_poses(object, symmetry).size(), 1U);
+  EXPECT_NEAR(alternative_poses(object, symmetry)[0].X_WO.translation.x(), 0.3, 1e-12);
+}
+
+TEST(AlternativePoses, OfWhatIsLostOrSureAreNone) {
+  ObjectBelief object = three_groups();
+  object.state = TrackState::kLost;
+  EXPECT_TRUE(alternative_poses(object, geometry::SymmetryGroup::none()).empty());
+  object.state = TrackState::kTracked;
+  object.particles.resize(3);
+  normalize(object.particles);
+  EXPECT_TRUE(alternative_poses(object, geometry::SymmetryGroup::none()).empty());
+}
+
+TEST(AlternativePosesLaws, AreFewApartFromEachOtherAndShareWhatTheEstimateLeaves) {
+  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+    RandomStream stream(seed, Purpose::kTest);
+    ObjectBelief object = tests::random_object_belief(stream, "a");
+    object.state = TrackState::kTracked;
+    const auto none = geometry::SymmetryGroup::none();
+    const auto alternatives = alternative_poses(object, none);
+    RC_ASSERT(alternatives.size() <= kMostAlternatives);
+    double sum = 0.0, last = 1.0;
+    for (const AlternativePose& other : alternatives) {
+      RC_ASSERT(other.probability >= 0.01 && other.probability <= last);
+      last = other.probability;
+      sum += other.probability;
+    }
+    RC_ASSERT(sum <= object.existence + 1e-9);
+  }));
 }
 
 TEST(Estimate, TakesPosesThatLookAlikeForOne) {

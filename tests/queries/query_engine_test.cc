@@ -415,6 +415,7 @@ TEST(Where, TellsEachObjectsEstimate) {
   EXPECT_EQ(found.items[0].object, "carton");
   EXPECT_EQ(found.items[0].model, "carton");
   EXPECT_NEAR(found.items[0].estimate.mean.translation.x(), 0.25 * 0.1 + 0.75 * 0.12, 1e-12);
+  EXPECT_TRUE(found.items[0].alternatives.empty()) << "2 cm apart is one place";
   const Answer one = queries::answer(two_hypotheses(), {"", WhereQuery{"cup"}}, context);
   EXPECT_EQ(std::get<WhereAnswer>(one.what).items.size(), 1u);
   const Answer none = queries::answer(two_hypotheses(), {"", WhereQuery{"mug"}}, context);

@@ -3,6 +3,7 @@
 // the decoder of ROS messages.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -109,7 +110,12 @@ TEST(Foxglove, AdvertisesAndPublishesWhatIsSubscribed) {
   EXPECT_EQ(tf.transforms[0].child_frame_id, "prescene_camera");
   EXPECT_EQ(tf.transforms[1].child_frame_id, "prescene/box");
   EXPECT_DOUBLE_EQ(tf.transforms[1].transform.translation.x, 0.07);
-  EXPECT_EQ(decoded<interfaces::RosMarkerArray>(received["/prescene/markers"]).markers.size(), 2U);
+  const auto drawn = decoded<interfaces::RosMarkerArray>(received["/prescene/markers"]);
+  EXPECT_EQ(std::count_if(drawn.markers.begin(), drawn.markers.end(),
+                          [](const auto& marker) {
+                            return marker.action == static_cast<std::int32_t>(interfaces::RosMarkerAction::kAdd);
+                          }),
+            2);
   EXPECT_EQ(decoded<interfaces::RosDetection3dArray>(received["/prescene/detections"]).detections.size(), 1U);
   const auto picture = decoded<interfaces::RosCompressedImage>(received["/prescene/camera/image/compressed"]);
   const auto info_of_camera = decoded<interfaces::RosCameraInfo>(received["/prescene/camera/camera_info"]);

@@ -26,6 +26,7 @@ nlohmann::ordered_json to_json(const ObjectBelief& object);
 /// [{"name", "mean", "standard_deviation", "low", "high"}]
 nlohmann::ordered_json to_json(const std::vector<ParameterEstimate>& estimates);
 nlohmann::ordered_json to_json(const std::vector<JointEstimate>& estimates);
+nlohmann::ordered_json to_json(const std::vector<AlternativePose>& alternatives);
 /// Without the scene (which a scene file holds).
 nlohmann::ordered_json to_json(const Belief& belief);
 nlohmann::ordered_json to_json(const Query& query);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "prescene/belief/achieve.h"
+#include "prescene/belief/alternative_poses.h"
 #include "prescene/belief/belief.h"
 #include "prescene/belief/effort.h"
 #include "prescene/belief/observed_timeline.h"
@@ -83,8 +84,9 @@ struct WhereAnswer {
     double existence = 1.0;
     /// What is believed of those of its physical parameters that its model leaves open, ...
     std::vector<ParameterEstimate> parameters = {};
-    int lessons = 0;              ///< ... by so many pieces of evidence (0 = the priors), ...
-    core::TimeNs learned_ns = 0;  ///< ... the last of which ended at this stamp.
+    int lessons = 0;                                 ///< ... by so many pieces of evidence (0 = the priors), ...
+    core::TimeNs learned_ns = 0;                     ///< ... the last of which ended at this stamp.
+    std::vector<AlternativePose> alternatives = {};  ///< Where else it may be; those about the estimate are none.
 
     friend bool operator==(const Item&, const Item&) = default;
   };

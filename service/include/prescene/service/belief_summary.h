@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/belief/alternative_poses.h"
 #include "prescene/belief/belief.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 
@@ -31,6 +32,7 @@ struct ObjectSummary {
   bool is_new = false;  ///< The scene does not name it: it was found (filter::is_unknown_object).
   /// Edges of the bounding box of a new one in its own frame, about its origin, m; zero for others.
   geometry::Vector3d size = geometry::Vector3d::Zero();
+  std::vector<belief::AlternativePose> alternatives = {};  ///< Where else it may be.
 };
 
 struct BeliefSummary {
@@ -43,7 +45,8 @@ struct BeliefSummary {
 BeliefSummary summary_of(const belief::Belief& belief);
 /// {"step", "stamp_ns", "objects": [{"name", "model", "state", "confidence", "existence", "pose", "covariance" (36
 /// numbers, row-major), "twist", "evidence_per_pixel", "visible_share", "parameters": [{"name", "mean",
-/// "standard_deviation", "low", "high"}], "lessons", "learned_ns", of new objects "size" ([x, y, z])}],
+/// "standard_deviation", "low", "high"}], "lessons", "learned_ns", "alternatives": [{"pose", "probability"}], of new
+/// objects "size" ([x, y, z])}],
 /// where the scene has joints "joints": [{"joint", "type", "unit", "position", "standard_deviation", "velocity",
 /// "limits", "confidence"}]}
 nlohmann::ordered_json to_json(const BeliefSummary& summary);
