@@ -16,8 +16,8 @@
 #include "benchmarks/dice_engines.h"
 #include "benchmarks/report.h"
 #include "prescene/core/check.h"
+#include "prescene/service/backends.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
-#include "prescene/simulation/lockstep/lockstep_simulator.h"
 #include "prescene/simulation/outcomes/outcome_estimator.h"
 #include "tests/peers/scene_mujoco.h"
 #include "tests/support/engine_scenes.h"
@@ -64,9 +64,13 @@ std::vector<int> by_bullet(const Problem& problem, double step) {
   return classes_by(**simulator, problem);
 }
 
-std::vector<int> by_lockstep(const Problem& problem) {
-  simulation::ShapeStore shapes;
-  const auto simulator = simulation::make_lockstep_simulator(*problem.named.scene, shapes);
+/// In the steps that users get (`step: auto`).
+std::vector<int> by_default(const Problem& problem, service::Stepper stepper) {
+  core::ThreadPool pool(2);
+  service::BackendSettings settings;
+  settings.stepper = stepper;
+  service::Backends backends(pool, settings);
+  const auto simulator = backends.make_simulator(*problem.named.scene, 1.0);
   PRESCENE_CHECK(simulator.ok());
   return classes_by(**simulator, problem);
 }
@@ -114,8 +118,8 @@ void measure_scenes(int instances, Report* report) {
   for (const tests::EngineScene& named : tests::engine_scenes()) {
     std::fprintf(stderr, "%s\n", named.name.c_str());
     const Problem problem = problem_of(named, instances);
-    const std::vector<int> bullet = by_bullet(problem, simulation::BulletOptions{}.step);
-    const std::vector<int> lockstep = by_lockstep(problem);
+    const std::vector<int> bullet = by_default(problem, service::Stepper::kBullet);
+    const std::vector<int> lockstep = by_default(problem, service::Stepper::kLockstep);
     const std::vector<int> fine = by_bullet(problem, kFineStep);
     const std::vector<int> mujoco = by_mujoco(problem);
     bool apart = false, apart_fine = false;
