@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "evaluation_report.h"
 #include "prescene/core/text.h"
 #include "prescene/service/calibration/toss_evaluation.h"
 
@@ -65,6 +66,9 @@ core::Status evaluate_folder(const EvaluateFolderOptions& options, VerbContext& 
     return core::invalid_input("--model and --folds exclude each other: each part is forecast with a model of its own");
   if (options.max_evaluations && !options.folds)
     return core::invalid_input("--max-evaluations goes with --folds: nothing else is fitted");
+  std::vector<std::string> inputs = {options.folder + "/scene.yaml", options.folder + "/tosses.csv"};
+  if (!options.model.empty()) inputs.push_back(options.model);
+  PRESCENE_RETURN_IF_ERROR(check_output("--report", options.report, inputs));
   PRESCENE_TRY(const MotionDataset dataset, read_motion_dataset(options.folder, context.log()));
   BackendSettings settings;
   settings.stepper = Stepper::kAutomatic;
@@ -81,6 +85,18 @@ core::Status evaluate_folder(const EvaluateFolderOptions& options, VerbContext& 
   }
   context.end_progress();
   if (!found) return found.status();
+  if (!options.report.empty()) {
+    interfaces::ReportContents contents;
+    contents.title = options.folder;
+    contents.subtitle = "Forecasts of recorded tosses against how they ended";
+    const std::string model = options.folds ? "fitted to the others, " + std::to_string(*options.folds) + " parts"
+                              : options.model.empty() ? std::string("the scene's own")
+                                                      : options.model;
+    contents.facts = {{"folder", options.folder}, {"model", model}, {"seed", std::to_string(context.options().seed)}};
+    contents.sections = evaluation_sections(*found);
+    PRESCENE_RETURN_IF_ERROR(interfaces::write_report(options.report, contents));
+    core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
+  }
   nlohmann::ordered_json document;
   document["folder"] = options.folder;
   document["model"] = options.model;

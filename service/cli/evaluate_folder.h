@@ -14,7 +14,8 @@ struct EvaluateFolderOptions {
   std::string model;  ///< A model file; empty: the scene's own.
   std::optional<int> folds;
   std::optional<int> max_evaluations;
-  bool each = false;  ///< Every toss in the text as well.
+  bool each = false;   ///< Every toss in the text as well.
+  std::string report;  ///< Empty: none.
 };
 core::Status evaluate_folder(const EvaluateFolderOptions& options, VerbContext& context);
 

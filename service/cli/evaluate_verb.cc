@@ -189,9 +189,10 @@ core::Status run(const EvaluateOptions& options, VerbContext& context) {
     own.folder = options.name;
     return evaluate_folder(own, context);
   }
-  if (!options.own.model.empty() || options.own.folds || options.own.max_evaluations || options.own.each)
+  if (!options.own.model.empty() || options.own.folds || options.own.max_evaluations || options.own.each ||
+      !options.own.report.empty())
     return core::invalid_input(
-        "--model, --folds, --max-evaluations and --each go with a folder of your own tosses, "
+        "--model, --folds, --max-evaluations, --each and --report go with a folder of your own tosses, "
         "not with " +
         options.name);
   if (options.name == "tracking") return run_tracking(options, context);
@@ -278,6 +279,9 @@ Verb add_evaluate_verb(CLI::App& app) {
                    "Of a folder, with --folds: models that each fit's search tries at most; 1500")
       ->check(CLI::Range(1, 100000));
   verb->add_flag("--each", options->own.each, "Of a folder: print a line for each toss (--json always has them)");
+  verb->add_option("--report", options->own.report,
+                   "Of a folder: write a page with scores, reliability and errors (HTML)")
+      ->check(file_name());
   verb->add_option("--data", options->data, "Folder that holds the data sets' folders");
   verb->add_option("--split", options->split, "Of cube_tosses: calibrate (even places in the list), report (odd), all")
       ->check(one_of({"calibrate", "report", "all"}))

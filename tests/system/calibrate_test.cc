@@ -139,7 +139,10 @@ TEST_F(CalibrateTest, EvaluateScoresAFolder) {
   EXPECT_EQ(document["scores"]["n"], 6);
   EXPECT_EQ(document["tosses"].size(), 6U);
   EXPECT_THAT(document["remarks"].dump(), HasSubstr("the model says nothing of how throws differ"));
-  const Finished text = run_program({"evaluate", folder_.string(), "--each", "-q"});
+  const std::string report = (folder_ / "report.html").string();
+  const Finished text = run_program({"evaluate", folder_.string(), "--each", "-q", "--report", report});
+  EXPECT_THAT(read_file(report), HasSubstr("Whether probabilities mean what they say"));
+  EXPECT_THAT(read_file(report), HasSubstr("toss 5"));
   EXPECT_THAT(text.out, HasSubstr("in 90 % region, %"));
   EXPECT_THAT(text.out, HasSubstr("toss 5"));
   for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
@@ -148,6 +151,8 @@ TEST_F(CalibrateTest, EvaluateScoresAFolder) {
            {"evaluate", folder_.string(), "--folds", "7"},
            {"evaluate", folder_.string(), "--data", "data"},
            {"evaluate", (folder_ / "absent").string()},
+           {"evaluate", folder_.string(), "--report", (folder_ / "tosses.csv").string()},
+           {"evaluate", "credible_regions", "--report", report},
            {"evaluate", "credible_regions", "--folds", "2"}})
     EXPECT_EQ(run_program(wrong).exit_code, 2) << wrong.back();
 }
