@@ -44,13 +44,15 @@ install(CODE "execute_process(COMMAND \"${PROJECT_SOURCE_DIR}/tools/man_pages\" 
                       COMMAND_ERROR_IS_FATAL ANY)" COMPONENT program_files)
 install(DIRECTORY "${PROJECT_BINARY_DIR}/man/" DESTINATION "${CMAKE_INSTALL_MANDIR}/man1" COMPONENT program_files)
 install(FILES packaging/prescene.service DESTINATION lib/systemd/system COMPONENT program_files)
+install(FILES packaging/prescene.bash DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions" RENAME prescene
+        COMPONENT program_files)
 install(FILES packaging/service.conf DESTINATION "${CMAKE_INSTALL_DOCDIR}/examples" COMPONENT program_files)
 # The sources of a ROS package, for who calls the service /prescene/ask.
 install(DIRECTORY packaging/prescene_msgs DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files)
 install(PROGRAMS tools/security_keys DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files)
 install(DIRECTORY scenarios DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files FILES_MATCHING PATTERN "*.yaml")
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation)
-install(DIRECTORY docs DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.bib")
+install(DIRECTORY docs DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation FILES_MATCHING PATTERN "*.md" PATTERN "*.svg" PATTERN "*.jpg" PATTERN "*.bib")
 
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME prescene)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
