@@ -9,7 +9,6 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <cstdlib>
 #include <deque>
 #include <exception>
 #include <mutex>
@@ -23,6 +22,7 @@
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
 #include <dds/ddsrt/log.h>
+#include "dds_configuration.h"
 #include "dds_node_impl.h"
 #include "idl_messages.h"
 #include "prescene/core/check.h"
@@ -39,20 +39,6 @@ core::Status dds_status(dds_return_t code, const std::string& doing) {
 }
 
 namespace {
-
-// Ours first, so that the user's CYCLONEDDS_URI has the last word.
-std::string configuration(const DdsOptions& options) {
-  std::string xml =
-      "<General><MaxMessageSize>65500B</MaxMessageSize></General>"
-      "<Internal><SocketReceiveBufferSize max=\"" +
-      std::to_string(options.receive_buffer_bytes) + "B\"/><MaxSampleSize>" +
-      // Beyond our own limit, so that what exceeds it comes here and is counted.
-      std::to_string(2 * options.max_message_bytes) + "B</MaxSampleSize></Internal>";
-  if (options.find_interfaces)
-    xml += "<Tracing><Category>config</Category><OutputFile>/dev/null</OutputFile></Tracing>";
-  if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri && *uri) xml += std::string(",") + uri;
-  return xml;
-}
 
 /// Cyclone takes some ten descriptors for a domain and, where it finds none, ends the program when it cleans up.
 core::Status check_descriptors() {
@@ -246,12 +232,13 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
     return core::invalid_input("DDS domain " + std::to_string(options.domain) +
                                ": ROS_DOMAIN_ID is a number from 0 to 230");
   }
+  PRESCENE_RETURN_IF_ERROR(check_network(options));
   PRESCENE_RETURN_IF_ERROR(check_descriptors());
   auto impl = std::make_unique<Impl>();
   impl->options = options;
   const auto domain_id = static_cast<dds_domainid_t>(options.domain);
   InterfaceListener listener(options.find_interfaces);
-  const dds_entity_t domain = dds_create_domain(domain_id, configuration(options).c_str());
+  const dds_entity_t domain = dds_create_domain(domain_id, configuration_of(options).c_str());
   // A second node of this process finds the domain made already and shares its configuration.
   if (domain < 0 && domain != DDS_RETCODE_PRECONDITION_NOT_MET) {
     return dds_status(domain, "DDS domain " + std::to_string(options.domain));

@@ -148,6 +148,7 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
       break;
     case TopicQos::kTf:
       depth = 100;
+      dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);  // a node's own transforms are no news to it
       break;
     case TopicQos::kLatched:
       depth = 1;

@@ -31,6 +31,16 @@ void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds) {
   auto* group = verb.add_option_group("Bus", "How to join the DDS bus");
   group->add_option("--domain", dds.domain, "DDS domain; default: that of ROS_DOMAIN_ID, else 0")
       ->check(CLI::Range(0, kLastDomain));
+  group
+      ->add_option("--interface", dds.interfaces,
+                   "Network interface to use, such as eth0, or lo for this machine only; may be given several times; "
+                   "default: one that Cyclone DDS chooses")
+      ->allow_extra_args(false);
+  group
+      ->add_option("--peer", dds.peers,
+                   "Machine on which to look for participants where multicast does not go, by address or name; may be "
+                   "given several times")
+      ->allow_extra_args(false);
   const std::map<std::string, interfaces::RosDistro> distros = {{"humble", interfaces::RosDistro::kHumble},
                                                                 {"jazzy", interfaces::RosDistro::kJazzy}};
   group

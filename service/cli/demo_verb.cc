@@ -31,6 +31,8 @@ namespace {
 using core::fixed_text;
 using Arguments = std::vector<std::string>;
 
+constexpr const char* kThisMachine = "lo";  // keeps the demo out of the robot's way
+
 struct DemoOptions {
   std::string folder = "prescene_demo";
 };
@@ -158,11 +160,11 @@ class Demo {
         " s, just before the robot lets go of it at " + fixed_text(release.time, 1) + " s");
     std::error_code none;
     std::filesystem::remove(path("session.mcap"), none);
-    PRESCENE_TRY(
-        RunningVerb service,
-        RunningVerb::start({"serve", "--scene", scene, "--seed", "1", "--record", path("session.mcap"), "-q"}, true));
+    PRESCENE_TRY(RunningVerb service, RunningVerb::start({"serve", "--scene", scene, "--seed", "1", "--record",
+                                                          path("session.mcap"), "-q", "--interface", kThisMachine},
+                                                         true));
     PRESCENE_RETURN_IF_ERROR(
-        verb({"replay", milk, "--over-dds", "--report", path("report.html"), "--ask",
+        verb({"replay", milk, "--over-dds", "--interface", kThisMachine, "--report", path("report.html"), "--ask",
               R"(1.0:{"stability": {"object": "carton"}})", "--ask", on_the_way + ":" + what_if_done_now(release),
               "--ask", just_before + ":" + what_if_done_now(release), "--ask", R"(4.5:{"where": {}})"}));
     return service.stop();
@@ -176,7 +178,7 @@ core::Status run(const DemoOptions& options, VerbContext& context) {
   std::error_code error;
   std::filesystem::create_directories(options.folder, error);
   if (error) return core::unavailable(options.folder + ": cannot be made: " + error.message());
-  // A domain of its own keeps the demo out of a robot's way, and out of that of a demo beside it.
+  // A domain of its own keeps the demo out of that of a demo beside it.
   if (::setenv("ROS_DOMAIN_ID", std::to_string(100 + ::getpid() % 100).c_str(), 1) != 0)
     return core::unavailable("the environment cannot be changed");
   Demo demo(options.folder, context);

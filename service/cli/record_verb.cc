@@ -49,8 +49,10 @@ core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene
 }
 
 core::Status record_simulation(RecordOptions& options, VerbContext& context) {
-  if (options.verb->count("--domain") > 0)
-    return core::invalid_input("--domain is for recording the bus, and --simulate needs none: leave one of them out");
+  for (const char* name : kDomainOptions)
+    if (options.verb->count(name) > 0)
+      return core::invalid_input(std::string(name) +
+                                 " is for recording the bus, and --simulate needs none: leave one of them out");
   PRESCENE_RETURN_IF_ERROR(check_recording("-o", options.output, {options.simulate}));
   for (const std::string& text : options.removals) {
     PRESCENE_TRY(UnannouncedChange change, removal_from_text(text));

@@ -106,7 +106,7 @@ Verb add_doctor_verb(CLI::App& app);
 Verb add_demo_verb(CLI::App& app);
 
 /// What add_domain_option() adds.
-inline constexpr std::array kDomainOptions = {"--domain", "--ros-distro", "--security"};
+inline constexpr std::array kDomainOptions = {"--domain", "--interface", "--peer", "--ros-distro", "--security"};
 void add_domain_option(CLI::App& verb, interfaces::DdsOptions& dds);
 /// The domain that ROS_DOMAIN_ID names, unless one was given; to be called by what joins the bus. kInvalidInput where
 /// the variable holds none.

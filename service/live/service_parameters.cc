@@ -65,6 +65,13 @@ void add_settable(const belief::Scene& scene, const LiveSettings& settings, cons
   parameters.push_back(std::move(level));
 }
 
+/// "eth0 wlan0".
+std::string names_text(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : " ") + name;
+  return text;
+}
+
 }  // namespace
 
 std::vector<NodeParameter> service_parameters(const belief::Scene& scene, const LiveSettings& settings,
@@ -81,6 +88,7 @@ std::vector<NodeParameter> service_parameters(const belief::Scene& scene, const 
   fixed("color_form", topics.color_form, "What the colour topic carries; empty = as its name says.");
   fixed("camera_info_topic", topics.camera_info, "Topic of the camera infos.");
   fixed("tf_topic", topics.tf, "Topic of the transforms.");
+  fixed("publish_tf", settings.publish_tf, "Whether the objects' poses are published there, too.");
   fixed("tf_static_topic", topics.tf_static, "Topic of the static transforms.");
   fixed("joint_states_topic", topics.joint_states, "Topic of the joint states; empty = none.");
   fixed("use_sim_time", !topics.clock.empty(), "Whether time is simulated, and comes on /clock.");
@@ -89,6 +97,10 @@ std::vector<NodeParameter> service_parameters(const belief::Scene& scene, const 
         "Pose of the camera where tf has none, x y z qw qx qy qz (m); empty = tf must have it.");
   fixed("rectified", is_rectified(settings.tracker), "Whether the images are taken as rectified.");
   fixed("domain", std::int64_t{settings.dds.domain}, "DDS domain.");
+  fixed("interfaces", names_text(settings.dds.interfaces),
+        "Network interfaces that are used; empty = the middleware chose.");
+  fixed("peers", names_text(settings.dds.peers),
+        "Machines on which participants are looked for; empty = by multicast only.");
   fixed("ros_distro", word_of(settings.dds.ros_distro), "Release in whose form the node is announced; empty = none.");
   fixed("security", settings.dds.security.string(), "Folder with keys and permissions of DDS Security; empty = none.");
   fixed("learned", settings.learned_file.string(), "File in which what is learned is kept; empty = none.");

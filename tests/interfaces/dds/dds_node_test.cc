@@ -358,6 +358,28 @@ TEST(DdsNode, SaysWhichInterfaceItUses) {
   EXPECT_EQ((*node)->interfaces().find('\n'), std::string::npos);
 }
 
+TEST(DdsNode, UsesTheInterfaceThatItIsToldToUse) {
+  DdsOptions here = options();
+  here.domain = 10 + (options().domain - 10 + 101) % 200;  // where no node of this process was before
+  here.find_interfaces = true;
+  here.interfaces = {"lo"};
+  const auto node = DdsNode::create(here, {});
+  ASSERT_TRUE(node.ok()) << node.status().message();
+  EXPECT_EQ((*node)->interfaces().find("lo (index "), 0u) << (*node)->interfaces();
+}
+
+TEST(DdsNode, RefusesNamesOfInterfacesAndPeersThatAreNone) {
+  for (const std::string& name :
+       {std::string(), std::string("eth0\"/><x"), std::string("two words"), std::string(300, 'a')}) {
+    DdsOptions wrong = options();
+    wrong.interfaces = {"lo", name};
+    EXPECT_EQ(DdsNode::create(wrong, {}).status().code(), core::StatusCode::kInvalidInput) << name;
+    wrong.interfaces.clear();
+    wrong.peers = {name};
+    EXPECT_EQ(DdsNode::create(wrong, {}).status().code(), core::StatusCode::kInvalidInput) << name;
+  }
+}
+
 TEST(DdsNode, SaysWhenTheSystemGrantsASmallerReceiveBuffer) {
   std::vector<std::string> lines;
   const auto log = [&](core::LogLevel, const std::string& line) { lines.push_back(line); };

@@ -30,6 +30,11 @@ enum class RosDistro { kHumble, kJazzy };
 struct DdsOptions {
   int domain = 0;                      ///< 0 to 230; ROS_DOMAIN_ID.
   std::string node_name = "prescene";  ///< As `ros2 node list` shows it.
+  /// Network interfaces to use, by their names ("eth0"; "lo" = this machine only). Empty = the middleware chooses one.
+  std::vector<std::string> interfaces;
+  /// Machines to look for participants on, by address or name, where multicast does not reach them. They must look for
+  /// this one, too, or be reached by its multicast.
+  std::vector<std::string> peers;
   /// Publish which nodes there are (for `ros2 node list`); topics work without it. Set it to the release that all
   /// others on the bus have: the wrong form confuses their nodes.
   std::optional<RosDistro> ros_distro;
@@ -61,7 +66,7 @@ enum class TopicQos {
   kState,     ///< As kReliable, but a writer never waits: for state that the next sample replaces (poses, markers).
   kEvents,    ///< As kState, keep last 1000: changes of parameters.
   kCommands,  ///< As kReliable, keep last 100: readers of questions and controls, none of which replaces another.
-  kTf,        ///< Reliable, keep last 100.
+  kTf,        ///< Reliable, keep last 100; a reader does not get what writers of its own node send.
   kLatched,   ///< Reliable, transient local, keep last 1 (/tf_static writers, descriptions).
   kTfStatic,  ///< Reader of /tf_static: reliable, transient local, keep last 100.
 };
