@@ -163,9 +163,10 @@ core::Status run(AskOptions& options, VerbContext& context) {
   if (!options.scene.empty()) return ask_scene(options, question, context);
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
   PRESCENE_TRY(const auto client, QuestionClient::create(options.dds, context.log()));
-  PRESCENE_TRY(const std::string text,
-               client->ask(belief::json_text(question), options.timeout.value_or(seconds_to_wait(question)),
-                           context.cancellation()));
+  const auto asked = client->ask(belief::json_text(question), options.timeout.value_or(seconds_to_wait(question)),
+                                 context.cancellation(), context.progress("answering"));
+  context.end_progress();
+  PRESCENE_TRY(const std::string text, asked);
   const auto answer = parse_or_discard(text);
   if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
   PRESCENE_RETURN_IF_ERROR(belief::error_from_json(answer));

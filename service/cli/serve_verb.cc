@@ -132,6 +132,8 @@ Verb add_serve_verb(CLI::App& app) {
   add_web_options(*verb, "view-", options->view);
   for (const char* name : {"--view-address", "--view-token", "--view-origin"})
     verb->get_option(name)->needs(verb->get_option("--view"));
+  verb->add_flag("!--no-tf", options->settings.publish_tf,
+                 "Do not publish the objects' poses on the tf topic, as frames prescene/OBJECT");
   add_proposals_option(*verb, options->proposals);
   add_bus_options(*verb, options->settings.dds, options->settings.tracker);
   add_camera_options(*verb, options->settings.tracker.assembler);

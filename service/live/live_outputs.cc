@@ -86,8 +86,9 @@ void LiveService::Impl::publish() {
   }
   if (marker_limit.due())
     publish(markers, kMarkersTopic, kMarkersType, markers_of(summary, *belief->scene, meshes, world), stamp_ns);
-  // On the bus it would come back as the robot's.
-  record_output(settings.tracker.topics.tf, "tf2_msgs/msg/TFMessage", transforms_of(summary, world), stamp_ns);
+  const interfaces::RosTfMessage frames_of_objects = transforms_of(summary, world);
+  if (transforms) check_sent(node->publish(*transforms, frames_of_objects));
+  record_output(settings.tracker.topics.tf, kTransformsType, frames_of_objects, stamp_ns);
   record(kBeliefTopic, json);
 }
 
@@ -195,6 +196,7 @@ void LiveService::Impl::publish_diagnostics() {
   check_sent(node->publish(
       diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(stamp_ns), ""},
                                                   {to_diagnostic(now, last_reported, settings.dds.node_name)}}));
+  manager.tell_status(health_text(now));
   if (settings.on_health) settings.on_health(health_text(now));
   last_reported = now;
 }

@@ -108,6 +108,10 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   hooks.restart = [raw] { raw->put_text(kControlTopic, R"({"restart": true})"); };
   hooks.keeps_learned = impl->learned_file != nullptr;
   impl->calls = std::make_unique<ServiceCalls>(*impl->node, std::move(hooks), impl->log);
+  PRESCENE_TRY(impl->progress, impl->node->advertise(kProgressTopic, "std_msgs/msg/String", TopicQos::kState));
+  impl->settings.worker.on_progress = [raw](const std::string& progress) {
+    raw->check_sent(raw->node->publish(raw->progress, interfaces::RosString{progress}));
+  };
   impl->history = std::make_unique<HistoryKeeper>(backends, settings.history);
   impl->settings.worker.timeline = [raw] { return raw->history->timeline(); };
   impl->settings.worker.explain = [raw](const belief::ExplainQuestion& question, const queries::QueryContext& context) {
@@ -156,6 +160,9 @@ core::Status LiveService::Impl::join_bus() {
   PRESCENE_TRY(markers, node->advertise(kMarkersTopic, kMarkersType, TopicQos::kState));
   PRESCENE_TRY(diagnostics,
                node->advertise(kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray", TopicQos::kState));
+  if (settings.publish_tf) {
+    PRESCENE_TRY(transforms, node->advertise(settings.tracker.topics.tf, kTransformsType, TopicQos::kState));
+  }
   for (const belief::SceneObject& object : scene->objects) {
     PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name), kPoseType, TopicQos::kState));
   }
@@ -343,6 +350,7 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
     }
     impl.take_in(impl.inbox.take_all(until), cancellation);
     stepped = impl.look_after_frames();
+    impl.manager.note_turn();
   };
   while (!cancellation.requested()) {
     try {
@@ -351,6 +359,7 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
       impl.note_failure("a turn of the loop", error);
     }
   }
+  impl.manager.tell_stopping();
   core::log(impl.log, core::LogLevel::kInfo, "stopped after " + std::to_string(impl.steps) + " steps");
   const core::Status recorded = impl.recording ? impl.recording->close() : core::ok_status();
   if (impl.learned_file) impl.keep_learned();

@@ -22,6 +22,7 @@
 #include "prescene/service/live/log_limiter.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/live/service_health.h"
+#include "prescene/service/live/service_manager.h"
 #include "prescene/service/tracking/camera_frames.h"
 #include "service_calls.h"
 #include "service_parameters.h"
@@ -48,6 +49,7 @@ class RateLimit {
 struct LiveService::Impl {
   static constexpr const char* kDetectionsType = "vision_msgs/msg/Detection3DArray";
   static constexpr const char* kMarkersType = "visualization_msgs/msg/MarkerArray";
+  static constexpr const char* kTransformsType = "tf2_msgs/msg/TFMessage";
   static constexpr const char* kPoseType = "geometry_msgs/msg/PoseWithCovarianceStamped";
 
   Impl(std::shared_ptr<const belief::Scene> a_scene, const LiveSettings& a_settings, std::unique_ptr<Tracker> a_tracker,
@@ -110,6 +112,7 @@ struct LiveService::Impl {
   std::vector<CameraInput> cameras;
   std::unique_ptr<Tracker> tracker;
   std::unique_ptr<RollingRecording> recording;  // null where none was asked for
+  ServiceManager manager{manager_of_environment()};
   std::atomic<core::LogLevel> log_level{core::LogLevel::kInfo};
   LogLimiter log_limiter;
   core::LogSink log;
@@ -120,7 +123,8 @@ struct LiveService::Impl {
   FrameHistory frames;  // for questions what happened
   RateLimit learned_limit;
 
-  interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers;
+  interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers, progress;
+  std::optional<interfaces::DdsPublisher> transforms;
   std::map<std::string, interfaces::DdsPublisher> poses;
   MessageIndex next_index = 0;
   core::TimeNs last_now_ns = 0;

@@ -5,6 +5,7 @@
 #include <exception>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "prescene/belief/json.h"
@@ -23,6 +24,7 @@ constexpr std::size_t kLongestWithId = 4096;
 constexpr std::size_t kMostRefusalsWaiting = 256;
 // s between the last simulated instance and the end of all work on a question, at most.
 constexpr double kRestSeconds = 1.5;
+constexpr double kProgressInterval = 0.2;  // s, at least, between two messages on how far the work is
 
 /// Questions without limits of their own are bounded in time, so that a robot gets its answer.
 void bound_effort(belief::Query& query, double default_seconds, double most_seconds) {
@@ -38,6 +40,18 @@ void bound_effort(belief::Query& query, double default_seconds, double most_seco
 template <class Question>
 const std::string& id_in(const Question& question) {
   return std::visit([](const auto& one) -> const std::string& { return one.id; }, question);
+}
+
+/// The id in {"cancel": ID}; nothing where the text is no such request.
+std::optional<core::Result<std::string>> id_to_cancel(const std::string& text) {
+  // Looked for first, as all but a few texts are questions and need not be parsed twice.
+  if (text.find("\"cancel\"") == std::string::npos) return std::nullopt;
+  const auto document = belief::parse_json(text, kLongestWithId);
+  if (!document || !document->is_object() || !document->contains("cancel")) return std::nullopt;
+  const auto& id = document->at("cancel");
+  if (document->size() == 1 && id.is_string() && !id.get_ref<const std::string&>().empty())
+    return id.get<std::string>();
+  return core::invalid_input("cancel: give the id of a question, and nothing else: {\"cancel\": \"7\"}");
 }
 
 core::Status too_many_wait(std::size_t count) {
@@ -171,6 +185,10 @@ void QueryWorker::read(const std::string& question_json) {
     if (question_json.size() > kLongestQuestion)
       return refuse("", core::resource_exhausted("the question is longer than " + std::to_string(kLongestQuestion) +
                                                  " bytes: make it shorter"));
+    if (const auto cancelled = id_to_cancel(question_json)) {
+      if (!*cancelled) return refuse("", cancelled->status());
+      return cancel(**cancelled);
+    }
     std::shared_ptr<const Question> question;
     if (belief::asks_to_explain(question_json)) {
       auto read = belief::explain_question_from_json(question_json);
@@ -183,7 +201,7 @@ void QueryWorker::read(const std::string& question_json) {
                            std::holds_alternative<belief::TimelineQuery>(read->what);
       if (!at_once) bound_effort(*read, default_seconds_, most_seconds_);
       question = std::make_shared<const Question>(*std::move(read));
-      if (at_once) return answer(*question);
+      if (at_once) return answer(*question, stop_);
     }
     id = id_in(*question);
     core::Status reason;
@@ -213,10 +231,30 @@ void QueryWorker::read(const std::string& question_json) {
   }
 }
 
+void QueryWorker::cancel(const std::string& id) {
+  bool waited = false;
+  {
+    const std::lock_guard lock(mutex_);
+    ++counts_.cancels;
+    if (in_work_ && id_in(*in_work_) == id) {
+      end_of_work_->request();  // its answer says the rest
+      return;
+    }
+    waited = std::erase_if(waiting_, [&id](const auto& question) { return id_in(*question) == id; }) > 0;
+  }
+  if (waited)
+    refuse(id, core::cancelled("cancelled before it was begun"));
+  else
+    send(
+        error_answer(id, core::not_found("no question with this id waits or is worked on: it may be answered already")),
+        nullptr);
+}
+
 void QueryWorker::simulate_questions() {
   core::lower_thread_priority();
   for (;;) {
     std::shared_ptr<const Question> question;
+    std::shared_ptr<core::Cancellation> end;
     {
       std::unique_lock lock(mutex_);
       simulate_changed_.wait(lock, [&] { return stop_.requested() || !waiting_.empty(); });
@@ -224,12 +262,13 @@ void QueryWorker::simulate_questions() {
       question = std::move(waiting_.front());
       waiting_.pop_front();
       in_work_ = question;
+      end = end_of_work_ = std::make_shared<core::Cancellation>(stop_, core::Cancellation::Clock::time_point::max());
     }
-    answer(*question);
+    answer(*question, *end);
   }
 }
 
-void QueryWorker::answer(const Question& question) {
+void QueryWorker::answer(const Question& question, const core::Cancellation& cancelled) {
   const std::string& id = id_in(question);
   const auto finish = [&] {
     // Before the answer goes out: whoever has it may ask under the same id again.
@@ -237,7 +276,7 @@ void QueryWorker::answer(const Question& question) {
     if (in_work_.get() == &question) in_work_.reset();
   };
   try {
-    const Reply reply = reply_to(question);
+    const Reply reply = reply_to(question, cancelled);
     finish();
     if (reply.text.size() > interfaces::CdrLimits().max_string_bytes)
       return refuse(id, core::resource_exhausted("the answer has " + std::to_string(reply.text.size() >> 20) +
@@ -249,18 +288,35 @@ void QueryWorker::answer(const Question& question) {
   }
 }
 
-QueryWorker::Reply QueryWorker::reply_to(const Question& question) {
+core::ProgressSink QueryWorker::progress_of(const std::string& id) const {
+  if (!settings_.on_progress || id.empty()) return {};
+  return [this, id, told = std::optional<core::Stopwatch>()](const core::Progress& at) mutable {
+    if (told && told->seconds() < kProgressInterval) return;
+    told.emplace();
+    nlohmann::ordered_json json{{"id", id}, {"fraction", at.fraction}, {"text", at.text}, {"seconds_left", nullptr}};
+    if (at.seconds_left) json["seconds_left"] = *at.seconds_left;
+    try {
+      settings_.on_progress(belief::json_text(json));
+    } catch (const std::exception&) {  // no reason to end the work
+    }
+  };
+}
+
+QueryWorker::Reply QueryWorker::reply_to(const Question& question, const core::Cancellation& cancelled) {
   queries::QueryContext context = backends_.query_context(pool_);
   const double most_seconds = most_seconds_;
-  const core::Cancellation end(stop_, queries::deadline_after(most_seconds + kRestSeconds));
+  const core::Cancellation end(cancelled, queries::deadline_after(most_seconds + kRestSeconds));
   context.cancellation = context.abandoned = &end;
   context.simulate_until = queries::deadline_after(most_seconds);
   context.most_bytes = settings_.most_bytes;
   context.timeline = settings_.timeline;
-  return std::visit([&](const auto& one) { return reply_to(one, context); }, question);
+  if (&cancelled != &stop_) context.progress = progress_of(id_in(question));  // `where` is answered at once
+  if (context.progress) context.progress({0.0, std::nullopt, "begun"});
+  return std::visit([&](const auto& one) { return reply_to(one, context, cancelled); }, question);
 }
 
-QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query, const queries::QueryContext& context) {
+QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query, const queries::QueryContext& context,
+                                         const core::Cancellation& /*cancelled*/) {
   const std::shared_ptr<const belief::Belief> belief = snapshot_();
   // Before the first frame the scene file is all that is known, and says more than the particles drawn from it.
   const belief::Answer answer = belief->step == 0 ? queries::answer(belief->scene, belief->seed, query, context)
@@ -273,7 +329,8 @@ QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query, const queri
   return {belief::json_text(document), answer.what.index() > 0};
 }
 
-QueryWorker::Reply QueryWorker::reply_to(const belief::ExplainQuestion& question, queries::QueryContext context) {
+QueryWorker::Reply QueryWorker::reply_to(const belief::ExplainQuestion& question, queries::QueryContext context,
+                                         const core::Cancellation& cancelled) {
   if (!settings_.explain)
     return {error_answer(question.id, core::unavailable("frames are not kept here, so that nothing can be explained")),
             false};
@@ -281,8 +338,8 @@ QueryWorker::Reply QueryWorker::reply_to(const belief::ExplainQuestion& question
     context.simulate_until = std::min(*context.simulate_until, queries::deadline_after(*question.max_seconds));
   const auto document = settings_.explain(question, context);
   if (document) return {belief::json_text(*document), true};
-  // Nobody else stops it: its time was over in the middle of a search.
-  const bool too_late = document.status().code() == core::StatusCode::kCancelled && !stop_.requested();
+  // Its time was over in the middle of a search, unless somebody stopped it.
+  const bool too_late = document.status().code() == core::StatusCode::kCancelled && !cancelled.requested();
   return {error_answer(question.id,
                        too_late ? core::unavailable("the time ran out: give an object, a shorter window or fewer "
                                                     "points, or let questions take longer (--most-question-seconds)")
@@ -308,13 +365,14 @@ void QueryWorker::refuse_after_exception(const std::string& id, const char* doin
 
 void QueryWorker::send(const std::string& answer, std::uint64_t QueryCounts::*fate) {
   // Counted before: whoever has the answer finds it counted.
-  {
+  if (fate != nullptr) {
     const std::lock_guard lock(mutex_);
     ++(counts_.*fate);
   }
   try {
     on_answer_(answer);
   } catch (const std::exception&) {
+    if (fate == nullptr) return;
     {
       const std::lock_guard lock(mutex_);
       --(counts_.*fate);

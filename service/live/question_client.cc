@@ -74,8 +74,14 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
                                  const std::lock_guard lock(raw->mutex_);
                                  const auto waiting = raw->answers_.find(answer["id"].get<std::string>());
                                  if (waiting == raw->answers_.end()) return;  // somebody else's
-                                 waiting->second = text->data;
+                                 waiting->second.answer = text->data;
                                  raw->changed_.notify_all();
+                               }));
+  PRESCENE_RETURN_IF_ERROR(
+      client->node_->subscribe(kProgressTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable,
+                               [raw](interfaces::ReceivedMessage&& message) {
+                                 const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
+                                 if (text) raw->note_progress(parse_or_discard(text->data));
                                }));
   PRESCENE_TRY(client->queries_,
                client->node_->advertise(kQueryTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable));
@@ -84,12 +90,31 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
 
 QuestionClient::~QuestionClient() { node_.reset(); }
 
+void QuestionClient::note_progress(const nlohmann::ordered_json& said) {
+  const auto is = [&said](const char* key, bool (nlohmann::ordered_json::*kind)() const noexcept) {
+    return said.is_object() && said.contains(key) && (said[key].*kind)();
+  };
+  if (!is("id", &nlohmann::ordered_json::is_string) || !is("fraction", &nlohmann::ordered_json::is_number)) return;
+  core::Progress at;
+  at.fraction = said["fraction"].get<double>();
+  if (is("text", &nlohmann::ordered_json::is_string)) at.text = said["text"].get<std::string>();
+  if (is("seconds_left", &nlohmann::ordered_json::is_number)) at.seconds_left = said["seconds_left"].get<double>();
+  const std::lock_guard lock(mutex_);
+  const auto waiting = answers_.find(said["id"].get<std::string>());
+  if (waiting != answers_.end() && waiting->second.progress) waiting->second.progress(at);
+}
+
+core::Status QuestionClient::cancel(const std::string& id) {
+  return node_->publish(queries_, interfaces::RosString{belief::json_text({{"cancel", id}})});
+}
+
 /// Answers with an id are kept while it lives.
 class QuestionClient::Waiting {
  public:
-  Waiting(QuestionClient& client, std::string id) : client_(client), id_(std::move(id)) {
+  Waiting(QuestionClient& client, std::string id, const core::ProgressSink& progress)
+      : client_(client), id_(std::move(id)) {
     const std::lock_guard lock(client_.mutex_);
-    is_first_ = client_.answers_.try_emplace(id_).second;
+    is_first_ = client_.answers_.try_emplace(id_, Waited{{}, progress}).second;
   }
   ~Waiting() {
     if (!is_first_) return;
@@ -104,7 +129,7 @@ class QuestionClient::Waiting {
   /// The answer if it comes within the time; asked for again, the next one.
   std::optional<std::string> answer_within(std::chrono::milliseconds time) {
     std::unique_lock lock(client_.mutex_);
-    std::optional<std::string>& answer = client_.answers_.at(id_);
+    std::optional<std::string>& answer = client_.answers_.at(id_).answer;
     client_.changed_.wait_for(lock, time, [&] { return answer.has_value(); });
     return std::exchange(answer, std::nullopt);
   }
@@ -116,13 +141,15 @@ class QuestionClient::Waiting {
 };
 
 core::Result<std::string> QuestionClient::ask(const std::string& question_json, double timeout,
-                                              const core::Cancellation& cancellation) {
+                                              const core::Cancellation& cancellation,
+                                              const core::ProgressSink& progress) {
   auto question = parse_or_discard(question_json);
   if (!question.is_object()) return core::invalid_input("a question is a JSON object (docs/reference/queries.md)");
   if (question.contains("id") && !question["id"].is_string())
     return core::invalid_input("id: a question's id is a text, in quotes; leave it out to have one made");
   if (!question.contains("id") || question["id"] == "") question["id"] = new_id();
-  Waiting waiting(*this, question["id"].get<std::string>());
+  const std::string id = question["id"].get<std::string>();
+  Waiting waiting(*this, id, progress);
   if (!waiting.is_first())
     return core::invalid_input("id: a question with this id waits for its answer already; choose another id");
   const auto deadline =
@@ -132,7 +159,10 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
   bool was_busy = false;
   core::Status sent;  // of the last try
   while (steady_clock::now() < deadline) {
-    if (cancellation.requested()) return core::cancelled("stopped on request");
+    if (cancellation.requested()) {
+      if (found_service) static_cast<void>(cancel(id));  // what can't be told costs the service some seconds
+      return core::cancelled("stopped on request");
+    }
     // Both ways must be open, or the answer would be lost.
     const bool there = node_->matched_readers(queries_) > 0 && node_->matched_writers(kAnswerTopic) > 0;
     found_service = found_service || there;
@@ -147,6 +177,7 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
     ask_at = steady_clock::now() + kBusyPause;
   }
   if (!sent.ok()) return sent;
+  if (found_service) static_cast<void>(cancel(id));
   const std::string waited = " within " + core::rounded_text(timeout) + " s";
   if (was_busy)
     return core::unavailable("the service had too many questions waiting" + waited + ": ask fewer at a time");

@@ -88,7 +88,8 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
                seconds_since_frame, clock_topic, simulated_now_s, seconds_since_tick, last_step_seconds, not_simulated,
                physics_failure, steppers, lens, degraded, last_skip, last_refusal, last_failure, last_failure_ns] =
       health;
-  const auto& [answered, refused, unanswered, repeated, failed, question_failure, question_failure_ns] = questions;
+  const auto& [answered, refused, unanswered, repeated, cancels, failed, question_failure, question_failure_ns] =
+      questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
   const auto& [file, files, removed_files, interruptions, tries, lost_messages, failure, first_failure, without_belief,
                not_removed, not_repeated, unfinished, last_unfinished] = recording;
@@ -146,6 +147,7 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
           {"questions refused", std::to_string(refused)},
           {"questions without an answer", std::to_string(unanswered + unreadable_questions)},
           {"questions repeated", std::to_string(repeated)},
+          {"requests to cancel", std::to_string(cancels)},
           {"failures", std::to_string(failures + failed)},
           {"last failure", question_is_newer && !question_failure.empty() ? question_failure : last_failure},
           {"particles without physics", std::to_string(not_simulated)},

@@ -11,6 +11,7 @@
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/tracking/topics.h"
 #include "service_on_bus.h"
+#include "tests/service/listening_manager.h"
 
 namespace prescene::tests::bus_faults_test {
 namespace {
@@ -49,6 +50,37 @@ TEST_F(BusFaults, AClockThatJumpsByAnHourCostsAFewFrames) {
   EXPECT_GT(replay(file), 0);
   std::printf("compared: clock jumps of an hour: frames until a belief of the new time: %s; s: %s\n",
               spread_text(frames).c_str(), spread_text(seconds).c_str());
+}
+
+TEST_F(BusFaults, TheEndOfATerminalClosesTheRecording) {
+  const std::string file = path("terminal.mcap");
+  // The program leaves a signal ignored that whoever started it ignores, as nohup does; that may be how the tests run.
+  const auto before = std::signal(SIGHUP, SIG_DFL);
+  const auto service = serve({"--record", file});
+  std::signal(SIGHUP, before);
+  ASSERT_TRUE(tracks(*service)) << log();
+  EXPECT_EQ(service->stop(SIGHUP), 0) << log();
+  EXPECT_EQ(read_back(file).loss, "");
+}
+
+TEST_F(BusFaults, TheServiceManagerHearsHowTheServiceIs) {
+  const ListeningManager manager(path("notify"));
+  const auto service = serve({}, "", {"NOTIFY_SOCKET=" + path("notify"), "WATCHDOG_USEC=600000"});
+  std::vector<std::string> heard;
+  const auto has = [&](const std::string& text) {
+    for (std::string& message : manager.heard()) heard.push_back(std::move(message));
+    return std::any_of(heard.begin(), heard.end(),
+                       [&](const std::string& message) { return message.starts_with(text); });
+  };
+  ASSERT_TRUE(drive([&] { return has("STATUS=tracking"); })) << log();
+  EXPECT_EQ(heard.front(), "READY=1");
+  EXPECT_TRUE(drive([&] {
+    static_cast<void>(has(""));
+    return std::count(heard.begin(), heard.end(), "WATCHDOG=1") >= 3;
+  }));
+  EXPECT_EQ(service->stop(SIGINT), 0) << log();
+  EXPECT_TRUE(has("STOPPING=1"));
+  EXPECT_EQ(std::count(heard.begin(), heard.end(), "READY=1"), 1);
 }
 
 TEST_F(BusFaults, PublishersThatComeAndGoLeaveNothingBehind) {

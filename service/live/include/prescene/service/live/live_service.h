@@ -36,6 +36,8 @@ struct LiveSettings {
   belief::EventWeights event_weights;  ///< How probable events are, of such questions: the scene file's.
   double marker_rate = 5.0;            ///< Markers a second, at most.
   double diagnostics_rate = 1.0;
+  /// Publish where the objects are on the tf topic, too, as frames "prescene/OBJECT". They are not read back.
+  bool publish_tf = true;
   /// For who looks on, all optional: what they do delays the service, so that they only hand over. Called on the
   /// thread of the belief after each step, with its belief; on those of the questions with each answer; and with each
   /// round of diagnostics, with a sentence on how the service is.

@@ -42,6 +42,10 @@ struct QueryWorkerSettings {
   std::function<core::Result<nlohmann::ordered_json>(const belief::ExplainQuestion& question,
                                                      const queries::QueryContext& context)>
       explain = {};
+  /// Told how far the work on a question with an id is, as JSON: {"id", "fraction", "text", "seconds_left" (null while
+  /// there is no estimate)}. Called on the thread that simulates when work begins and some times a second after that;
+  /// may be empty.
+  std::function<void(const std::string& progress)> on_progress = {};
 };
 
 /// What became of the questions since the start. Each that was asked and neither waits nor is worked on counts as
@@ -53,6 +57,7 @@ struct QueryCounts {
   /// over.
   std::uint64_t unanswered = 0;
   std::uint64_t repeated = 0;  ///< Came again while the same question with the same id waited.
+  std::uint64_t cancels = 0;   ///< No questions: {"cancel": ID}. What they end is counted as above.
   /// Exceptions, other than that the memory ended, that ended the work on a question or on handing over its answer:
   /// bugs. Such questions are among those refused or unanswered.
   std::uint64_t failed = 0;
@@ -80,7 +85,9 @@ class QueryWorker {
   /// Takes a question; returns at once, from any thread. One that is not understood or comes when too many wait gets an
   /// answer that says so. A question that waits to be simulated, or is being simulated, is not taken again: clients ask
   /// again when an answer is late. Another question with its id is refused: its asker would take the first one's answer
-  /// for its own. No exception leaves it.
+  /// for its own. {"cancel": ID} ends the work on a question: one that waits is refused, one that is being simulated is
+  /// answered from what was simulated until now. Where no question with the id waits, that is refused. No exception
+  /// leaves it.
   void ask(std::string question_json);
 
   QueryCounts counts() const;
@@ -99,23 +106,27 @@ class QueryWorker {
   // No exception leaves these.
   void read_questions();
   void read(const std::string& question_json);
+  void cancel(const std::string& id);
   void simulate_questions();
   struct Reply {
     std::string text;
     bool is_answer = false;  ///< Else the reason why there is none.
   };
   /// Answers and counts; no exception leaves it, nor the four below.
-  void answer(const Question& question);
+  void answer(const Question& question, const core::Cancellation& cancelled);
   void refuse(const std::string& id, const core::Status& reason);
   /// In a handler, of an exception while `doing`.
   void refuse_after_exception(const std::string& id, const char* doing);
-  /// Counts the question as `fate`, and as unanswered where the answer can't be handed over.
+  /// Counts the question as `fate` (null: it is none), and as unanswered where the answer can't be handed over.
   void send(const std::string& answer, std::uint64_t QueryCounts::*fate);
   /// In a handler: the question got no answer, because of the exception.
   void drop();
-  Reply reply_to(const Question& question);
-  Reply reply_to(const belief::Query& query, const queries::QueryContext& context);
-  Reply reply_to(const belief::ExplainQuestion& question, queries::QueryContext context);
+  Reply reply_to(const Question& question, const core::Cancellation& cancelled);
+  /// Of the question with that id; empty where nobody is told.
+  core::ProgressSink progress_of(const std::string& id) const;
+  Reply reply_to(const belief::Query& query, const queries::QueryContext& context, const core::Cancellation& cancelled);
+  Reply reply_to(const belief::ExplainQuestion& question, queries::QueryContext context,
+                 const core::Cancellation& cancelled);
   /// In a handler, of an exception while `doing`: counts it as a failure unless the memory ended, and says what to
   /// refuse the question with.
   core::Status note_exception(const char* doing);
@@ -136,7 +147,8 @@ class QueryWorker {
   std::size_t unread_bytes_ = 0;
   std::deque<std::string> too_many_;  // ids of questions that found no room
   std::deque<std::shared_ptr<const Question>> waiting_;
-  std::shared_ptr<const Question> in_work_;  // null: none
+  std::shared_ptr<const Question> in_work_;          // null: none
+  std::shared_ptr<core::Cancellation> end_of_work_;  // of that question
   QueryCounts counts_;
 
   std::thread reader_, simulator_;  // last: they use all above

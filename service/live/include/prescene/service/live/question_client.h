@@ -26,21 +26,28 @@ class QuestionClient {
   ~QuestionClient();
 
   /// Sends a question (JSON; an id is added if it has none) as soon as a service is there, and waits for its answer. A
-  /// service that starts again meanwhile is asked again. May be called from several threads at once, with ids of their
-  /// own. Fails with kUnavailable after `timeout` s (no service, no answer, or the middleware took no question),
-  /// kInvalidInput when the question is not a JSON object, its id is no text, or another thread waits for an answer
-  /// with its id, kCancelled.
+  /// service that starts again meanwhile is asked again; one whose answer nobody waits for any more is told to cancel
+  /// the question. `progress`: called on a thread of the client while the service works on it; may be empty. May be
+  /// called from several threads at once, with ids of their own. Fails with kUnavailable after `timeout` s (no service,
+  /// no answer, or the middleware took no question), kInvalidInput when the question is not a JSON object, its id is no
+  /// text, or another thread waits for an answer with its id, kCancelled.
   core::Result<std::string> ask(const std::string& question_json, double timeout,
-                                const core::Cancellation& cancellation);
+                                const core::Cancellation& cancellation, const core::ProgressSink& progress = {});
 
  private:
   QuestionClient() = default;
 
   class Waiting;
+  void note_progress(const nlohmann::ordered_json& said);
+  core::Status cancel(const std::string& id);
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::map<std::string, std::optional<std::string>> answers_;  // by id, of those waited for; nothing until it came
+  struct Waited {
+    std::optional<std::string> answer;  // nothing until it came
+    core::ProgressSink progress;
+  };
+  std::map<std::string, Waited> answers_;  // by id, of those waited for
   interfaces::DdsPublisher queries_;
   std::unique_ptr<interfaces::DdsNode> node_;  // last: its thread ends first
 };

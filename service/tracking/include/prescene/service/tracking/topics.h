@@ -47,10 +47,11 @@ bool names_rectified_images(const std::string& topic);
 core::Status validate(const InputTopics& topics);
 
 // Our own topics. JSON is carried by std_msgs/String, so that `ros2 topic pub` and `echo` can speak it.
-inline constexpr const char* kControlTopic = "/prescene/control";  ///< in: {"actions": [...]}, what the robot does
-inline constexpr const char* kQueryTopic = "/prescene/query";      ///< in: docs/reference/queries.md
-inline constexpr const char* kAnswerTopic = "/prescene/answer";    ///< out
-inline constexpr const char* kBeliefTopic = "/prescene/belief";    ///< out: states and estimates as JSON
+inline constexpr const char* kControlTopic = "/prescene/control";    ///< in: {"actions": [...]}, what the robot does
+inline constexpr const char* kQueryTopic = "/prescene/query";        ///< in: docs/reference/queries.md
+inline constexpr const char* kAnswerTopic = "/prescene/answer";      ///< out
+inline constexpr const char* kProgressTopic = "/prescene/progress";  ///< out: how far the work on a question is
+inline constexpr const char* kBeliefTopic = "/prescene/belief";      ///< out: states and estimates as JSON
 inline constexpr const char* kDetectionsTopic = "/prescene/detections";  ///< out: vision_msgs/Detection3DArray
 inline constexpr const char* kMarkersTopic = "/prescene/markers";        ///< out: visualization_msgs/MarkerArray
 inline constexpr const char* kDiagnosticsTopic = "/diagnostics";         ///< out: diagnostic_msgs/DiagnosticArray
