@@ -90,6 +90,16 @@ std::string joint_text(const belief::JointForecast& joint) {
          " (90 %: " + number(joint.low) + " to " + number(joint.high) + ")\n";
 }
 
+/// Each stepper has a limit of its own (docs/reference/simulation.md).
+std::string hull_note(const belief::PredictAnswer& predicted) {
+  if (predicted.hull_error <= 0.0) return "";
+  const std::string error = fixed_text(1e3 * predicted.hull_error, 2) + " mm";
+  if (predicted.stepper == "bullet")
+    return "Note: Bullet's stepper simplifies hulls of more than 1500 vertices, here by up to " + error + ".\n";
+  return "Note: Hulls of more than 64 vertices, or 16 corners a side, are simplified, here by up to " + error +
+         "; '--stepper bullet' takes those of up to 1500 vertices as they are.\n";
+}
+
 std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
   std::vector<std::vector<std::string>> rows = {
       {"outcome", "probability", core::rounded_text(100.0 * confidence) + " % interval"}};
@@ -119,11 +129,9 @@ std::string text_of(const belief::PredictAnswer& predicted, double confidence) {
     if (open) text += deciding_text(inputs, predicted.instances);
   }
   text += cost_text(predicted);
-  if (predicted.hull_error > 0.0)
-    text += "Note: Hulls of many vertices are simplified by up to " + fixed_text(1e3 * predicted.hull_error, 2) +
-            " mm; '--stepper bullet' takes them as they are.\n";
+  text += hull_note(predicted);
   if (!predicted.not_lockstep.empty())
-    text += "Note: Simulated by Bullet's stepper, which is 3 to 7 times slower than the lockstep stepper, because " +
+    text += "Note: Simulated by Bullet's stepper, which is 2.4 to 7 times slower than the lockstep stepper, because " +
             predicted.not_lockstep + ".\n";
   for (const std::string& remark : predicted.remarks) text += "Note: " + remark + "\n";
   return text;
@@ -251,7 +259,7 @@ Verb add_predict_verb(CLI::App& app) {
       ->check(in_range(belief::kDurations));
   verb->add_option(
           "--stepper", options->stepper,
-          "Simulator. lockstep: many instances at once, 3 to 7 times faster, but not every scene "
+          "Simulator. lockstep: many instances at once, 2.4 to 7 times faster, but not every scene "
           "(docs/reference/simulation.md says which; others are refused). bullet: every scene. automatic: lockstep "
           "where it can, else bullet, and the answer says why")
       ->check(one_of({"automatic", "bullet", "lockstep"}))

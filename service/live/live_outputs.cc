@@ -169,7 +169,7 @@ void LiveService::Impl::report_changes(const ServiceHealth& health) {
         "physics failed, so what it was to move goes on at constant velocity: " + health.physics_failure);
   if (!health.steppers.last_reason.empty())
     log_limiter.log_once(core::LogLevel::kWarning,
-                         "simulating with Bullet's stepper, which is 3 to 7 times slower than in lockstep: " +
+                         "simulating with Bullet's stepper, which is 2.4 to 7 times slower than in lockstep: " +
                              health.steppers.last_reason);
   if (health.other_services > 0) log_limiter.log_once(core::LogLevel::kWarning, others_text(health.other_services));
   if (!health.nothing_came.empty() && !reported_no_frames)
