@@ -20,7 +20,7 @@ using simulation::Similarity;
 
 constexpr double kWithin = 1.5;  // points
 
-/// Scenes A to D, a thick coin and a bottle at an edge.
+/// Scenes A to D, a thick coin and a carton on a bin's rim.
 std::vector<tests::NamedScene> six_scenes() {
   std::vector<tests::NamedScene> scenes = tests::uncertain_scenes();
   for (const tests::EngineScene& engine : tests::engine_scenes())
