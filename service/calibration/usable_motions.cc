@@ -120,7 +120,7 @@ core::Result<UsableMotions> usable_motions(const MotionDataset& dataset, std::si
         dataset.table_file().string() + ": only " + std::to_string(independent) + " of " +
         std::to_string(usable.motions.size()) +
         " recordings are motions of their own, the others are twins of them; it takes at least " +
-        std::to_string(least));
+        std::to_string(least) + ": record more, or keep parameters as they are (--keep)");
   }
   for (const std::string& reason : refused) usable.remarks.push_back("left out: " + reason);
   return usable;

@@ -326,5 +326,27 @@ TEST_F(ObjectCalibrationTest, TooFewRecordingsSayHowManyItTakes) {
   EXPECT_THAT(std::string(found.status().message()), HasSubstr("only 6 recordings; 8 parameters take at least 11"));
 }
 
+TEST_F(ObjectCalibrationTest, TwinsOfOneMotionAreNotEnough) {
+  write("scene.yaml", box_scene_yaml({}));
+  const belief::Scene scene = box_scene({});
+  const auto one =
+      simulated_tosses(scene, **backends_.make_simulator(scene), 1, core::RandomStream(1, core::Purpose::kTest), pool_);
+  std::vector<SimulatedMotion> motions;
+  for (int i = 0; i < 12; ++i) {
+    motions.push_back(one[0]);
+    const geometry::Pose X{geometry::exp_rotation({0.0, 0.0, 0.5 * i}), geometry::Vector3d(0.03 * i, -0.01 * i, 0.0)};
+    for (geometry::Pose& X_WO : motions.back().X_WO) X_WO = X * X_WO;
+  }
+  write("tosses.csv", motion_table(motions));
+  const auto dataset = read_motion_dataset(folder_, {});
+  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  const auto found = calibrate_object(*dataset, backends_, {});
+  ASSERT_FALSE(found.ok());
+  EXPECT_EQ(found.status().code(), core::StatusCode::kInvalidInput);
+  EXPECT_THAT(std::string(found.status().message()),
+              AllOf(HasSubstr("tosses.csv: only 1 of 12 recordings"), HasSubstr("twins"),
+                    HasSubstr("it takes at least 11: record more")));
+}
+
 }  // namespace
 }  // namespace prescene::tests
