@@ -21,10 +21,12 @@ geometry::Box bounds_of(const ObjectModel& model) {
 
 }  // namespace
 
+double object_size(const ObjectModel& model) { return std::cbrt(bounds_of(model).sizes().prod()); }
+
 double smallest_size(const Scene& scene) {
   double smallest = std::numeric_limits<double>::infinity();
   for (const SceneObject& object : scene.objects) {
-    const double size = std::cbrt(bounds_of(scene.model_of(object)).sizes().prod());
+    const double size = object_size(scene.model_of(object));
     if (size > 0.0) smallest = std::min(smallest, size);
   }
   return std::isfinite(smallest) ? smallest : kHouseholdSize;

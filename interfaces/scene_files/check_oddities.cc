@@ -2,7 +2,9 @@
 // What a valid scene may still not be meant to say.
 #include <algorithm>
 #include <array>
+#include <vector>
 
+#include "prescene/belief/scene_size.h"
 #include "prescene/belief/validation.h"
 #include "prescene/core/text.h"
 #include "prescene/geometry/triangle_mesh.h"
@@ -24,6 +26,29 @@ void warn_of_mass_ratios(const LocatedValue& objects, const belief::Scene& scene
                       interfaces::quote(lightest->name) + ", " + core::rounded_text(mass(object)) + " and " +
                       core::rounded_text(mass(*lightest)) + " kg",
                   "trust no outcome in which it rests on that (docs/reference/simulation.md, Limits)");
+  }
+}
+
+// The same of sizes.
+void warn_of_size_ratios(const LocatedValue& objects, const belief::Scene& scene, Problems& problems) {
+  std::vector<double> sizes;
+  const belief::SceneObject* smallest = nullptr;
+  double least = 0.0;
+  for (const belief::SceneObject& object : scene.objects) {
+    sizes.push_back(belief::object_size(scene.model_of(object)));
+    if (sizes.back() <= 0.0 || (smallest != nullptr && sizes.back() >= least)) continue;
+    smallest = &object;
+    least = sizes.back();
+  }
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    if (smallest == nullptr || sizes[i] <= belief::kGreatestSizeRatio * least) continue;
+    const LocatedValue& at = *objects.find(scene.objects[i].name);
+    problems.warn(at.place, at.path,
+                  "it is more than " + core::rounded_text(belief::kGreatestSizeRatio) + " times as large as " +
+                      interfaces::quote(smallest->name) + ", " + core::rounded_text(sizes[i]) + " and " +
+                      core::rounded_text(least) + " m",
+                  "check the units of both; step and tolerances of the simulation fit the smallest object "
+                  "(docs/reference/simulation.md, Limits)");
   }
 }
 
@@ -108,7 +133,10 @@ void warn_of_oddities(const LocatedValue& document, const belief::Scene& scene, 
         "an action is at " + number_text(action.time) + " s, after the end at " + number_text(scene.duration) + " s",
         "raise 'duration'");
   }
-  if (const LocatedValue* objects = document.find("objects")) warn_of_mass_ratios(*objects, scene, problems);
+  if (const LocatedValue* objects = document.find("objects")) {
+    warn_of_mass_ratios(*objects, scene, problems);
+    warn_of_size_ratios(*objects, scene, problems);
+  }
 }
 
 }  // namespace prescene::interfaces

@@ -96,6 +96,27 @@ TEST(PlausibleScene, WarnsOfMassesThatTheSolverCannotStack) {
   EXPECT_EQ(read(two("10")).warnings, "");
 }
 
+TEST(PlausibleScene, WarnsOfSizesThatOneSimulationDoesNotFit) {
+  const auto beside = [](const std::string& small, const std::string& large) {
+    return read(
+        "models:\n  small: {sphere: " + small + ", mass: 1}\n  large: {box: [" + large + "], mass: 1}\n" +
+        "supports:\n  table: {ground: {size: 4}}\nobjects:\n  a: {model: small, pose: {position: [0, 0, 1]}}\n" +
+        "  b: {model: large, pose: {position: [9, 0, 6]}}\n");
+  };
+  // Balls of 2 mm and 20 um; by the volume of its box, a plank is no larger than a cube.
+  for (const auto& [small, large] :
+       {std::pair("0.001", "2.1, 2.1, 2.1"), std::pair("0.001", "10, 10, 0.1"), std::pair("0.00001", "10, 10, 10")}) {
+    const Read found = beside(small, large);
+    EXPECT_EQ(found.errors, "") << large;
+    EXPECT_THAT(found.warnings, AllOf(HasSubstr("s.yaml:8: objects.b: it is more than 1000 times as large as 'a'"),
+                                      HasSubstr("check the units of both")))
+        << large;
+  }
+  EXPECT_THAT(beside("0.001", "2.1, 2.1, 2.1").warnings, HasSubstr(", 2.1 and 0.002 m"));
+  for (const auto& [small, large] : {std::pair("0.001", "1.9, 1.9, 1.9"), std::pair("0.001", "10, 10, 0.05")})
+    EXPECT_EQ(beside(small, large).warnings, "") << large;
+}
+
 TEST(PlausibleScene, NothingTouchesOrRestsOnItself) {
   for (const char* condition : {"resting_on", "touched"}) {
     const std::string key(condition);

@@ -6,10 +6,14 @@
 
 namespace prescene::belief {
 
-/// m: of the smallest object, the cube root of the volume of its box in its own axes. Objects with no extent count as
-/// absent; kHouseholdSize if there are none.
+/// m: the cube root of the volume of its box in its own axes.
+double object_size(const ObjectModel& model);
+/// m: that of the smallest object. Objects with no extent count as absent; kHouseholdSize if there are none.
 double smallest_size(const Scene& scene);
 inline constexpr double kHouseholdSize = 0.1;
+
+/// Steps and tolerances fit the smallest object; nothing was tested beside one larger by more than this factor.
+inline constexpr double kGreatestSizeRatio = 1000.0;
 
 /// m from W's origin: farther away things have left the world, and simulators freeze them. kWorldRadius for things up
 /// to kLargestInWorld; where the smallest object is larger, as many times larger.
