@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdint>
+#include <string_view>
 
 #include "charts.h"
 #include "html_text.h"
@@ -42,6 +44,7 @@ th { text-align: left; font-size: 0.8rem; color: var(--soft); font-weight: 600; 
 th, td { padding: 0.32rem 0.9rem 0.32rem 0; border-bottom: 1px solid var(--line); vertical-align: middle; }
 td.number, th.number { text-align: right; }
 tr.group th { padding-top: 0.9rem; color: var(--ink); font-size: 0.95rem; }
+a { color: var(--accent); }
 svg { max-width: 100%; height: auto; display: block; }
 td svg { min-width: 130px; }
 svg text { fill: var(--ink); font-size: 12px; font-family: inherit; }
@@ -56,6 +59,9 @@ svg .outline { fill: none; stroke: #ffffff; stroke-width: 1.5; stroke-opacity: 0
 footer { color: var(--soft); font-size: 0.82rem; margin-top: 2rem; }
 @media print { body { background: none; } section { break-inside: avoid; } }
 )css";
+
+constexpr std::string_view kEnd = "<footer>Made by Prescene.</footer>\n</main>\n</body>\n</html>\n";
+constexpr std::size_t kMostBytes = std::size_t{256} << 20;  // of a page that something is added to
 
 bool looks_like_a_number(const std::string& cell) {
   const bool has_digit = std::any_of(cell.begin(), cell.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
@@ -75,6 +81,25 @@ std::string html_of(const TextBlock& block) {
     at = end + 2;
   }
   return out;
+}
+
+/// Whatever the name is, it is that of a file beside the page: neither a scheme nor an anchor.
+std::string address_beside(const std::string& file) {
+  constexpr const char* kDigits = "0123456789ABCDEF";
+  std::string out = "./";
+  for (const char c : file) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0 || c == '.' || c == '-' || c == '_')
+      out += c;
+    else
+      out.append("%").append(1, kDigits[byte / 16]).append(1, kDigits[byte % 16]);
+  }
+  return out;
+}
+
+std::string html_of(const LinkBlock& block) {
+  return "<p>" + escaped(block.text) + " <a href=\"" + address_beside(block.file) + "\">" + escaped(block.file) +
+         "</a></p>\n";
 }
 
 std::string html_of(const PictureBlock& block) {
@@ -144,6 +169,14 @@ std::string html_of(const StateBandBlock& block) {
 }
 std::string html_of(const HeatMapBlock& block) { return figure(heat_map_svg(block) + "\n", block.caption); }
 
+std::string html_of(const ReportSection& section) {
+  std::string out = "<section>\n";
+  if (!section.title.empty()) out += "<h2>" + escaped(section.title) + "</h2>\n";
+  for (const ReportBlock& block : section.blocks)
+    out += std::visit([](const auto& one) { return html_of(one); }, block);
+  return out + "</section>\n";
+}
+
 }  // namespace
 
 std::string report_html(const ReportContents& contents) {
@@ -162,18 +195,21 @@ std::string report_html(const ReportContents& contents) {
     out += "</dl>\n";
   }
   out += "</header>\n";
-  for (const ReportSection& section : contents.sections) {
-    out += "<section>\n";
-    if (!section.title.empty()) out += "<h2>" + escaped(section.title) + "</h2>\n";
-    for (const ReportBlock& block : section.blocks)
-      out += std::visit([](const auto& one) { return html_of(one); }, block);
-    out += "</section>\n";
-  }
-  return out + "<footer>Made by Prescene.</footer>\n</main>\n</body>\n</html>\n";
+  for (const ReportSection& section : contents.sections) out += html_of(section);
+  return out.append(kEnd);
 }
 
 core::Status write_report(const std::filesystem::path& path, const ReportContents& contents) {
   return write_file(path, std::string_view(report_html(contents)));
+}
+
+core::Status add_section(const std::filesystem::path& path, const ReportSection& section) {
+  PRESCENE_TRY(const std::vector<std::uint8_t> bytes, read_file(path, kMostBytes));
+  std::string page(bytes.begin(), bytes.end());
+  if (!page.ends_with(kEnd))
+    return core::invalid_input(path.string() + ": it does not end as a report of Prescene does: write it anew");
+  page.insert(page.size() - kEnd.size(), html_of(section));
+  return write_file(path, std::string_view(page));
 }
 
 }  // namespace prescene::interfaces

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -20,6 +21,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/reports/report.h"
 #include "prescene/service/load_scene.h"
 #include "verb.h"
 
@@ -32,6 +34,7 @@ using core::fixed_text;
 using Arguments = std::vector<std::string>;
 
 constexpr const char* kThisMachine = "lo";  // keeps the demo out of the robot's way
+constexpr std::size_t kMostPrinted = std::size_t{1} << 20;  // bytes of an answer
 
 struct DemoOptions {
   std::string folder = "prescene_demo";
@@ -40,8 +43,8 @@ struct DemoOptions {
 /// A verb of this program in a process of its own, which is interrupted and waited for if nobody did.
 class RunningVerb {
  public:
-  /// Its answers go to stderr with `quiet_stdout`.
-  static core::Result<RunningVerb> start(const Arguments& arguments, bool quiet_stdout) {
+  /// Its answers go into the file `into`, if any, or to stderr with `quiet_stdout`.
+  static core::Result<RunningVerb> start(const Arguments& arguments, bool quiet_stdout, const std::string& into = "") {
     Arguments words = {"prescene"};
     words.insert(words.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv;
@@ -49,7 +52,10 @@ class RunningVerb {
     argv.push_back(nullptr);
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
-    if (quiet_stdout) posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+    if (!into.empty())
+      posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, into.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    else if (quiet_stdout)
+      posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
     pid_t process = -1;
     const int error = ::posix_spawn(&process, "/proc/self/exe", &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
@@ -105,6 +111,19 @@ std::string what_if_done_now(belief::Action action) {
          R"(], "effort": {"max_seconds": 0.8}}})";
 }
 
+/// The first lines, joined to one.
+std::string first_lines(const std::string& text, int count) {
+  std::string joined;
+  std::size_t at = 0;
+  for (int i = 0; i < count && at < text.size(); ++i) {
+    const std::size_t begin = std::min(text.find_first_not_of(' ', at), text.size());
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    joined += (i == 0 ? "" : "; ") + text.substr(begin, end - begin);
+    at = end + 1;
+  }
+  return joined;
+}
+
 class Demo {
  public:
   Demo(const std::string& folder, VerbContext& context) : folder_(folder), context_(context) {}
@@ -112,17 +131,24 @@ class Demo {
   core::Status run(const belief::Action& release) {
     const std::string scene = path("milk_on_bin.yaml"), milk = path("milk.mcap");
     PRESCENE_RETURN_IF_ERROR(step("what may happen, before anything was seen", {"predict", scene, "--seed", "1"}));
-    PRESCENE_RETURN_IF_ERROR(
-        step("where must the hand let go, so that the carton lands in the bin?",
-             {"achieve", scene, "--outcome", "in_bin", "--free", "position,pitch=-120:0,height=0:0.3", "--first",
-              "--seed", "1", "--report", path("achieve.html")}));
+    const std::string where_to_let_go = "where must the hand let go, so that the carton lands in the bin?";
+    PRESCENE_TRY(const std::string achieved,
+                 answered(where_to_let_go,
+                          {"achieve", scene, "--outcome", "in_bin", "--free", "position,pitch=-120:0,height=0:0.3",
+                           "--first", "--seed", "1", "--report", path("achieve.html")}));
     PRESCENE_RETURN_IF_ERROR(step("record a simulated robot with an RGB-D camera",
                                   {"record", "--simulate", scene, "-o", milk, "--seed", "3"}));
     PRESCENE_RETURN_IF_ERROR(live(scene, milk, release));
-    PRESCENE_RETURN_IF_ERROR(
-        step("did anything happen about the release that the robot did not report?",
-             {"explain", path("session.mcap"), "--from", fixed_text(release.time - 0.2, 2), "--to",
-              fixed_text(release.time + 1.0, 2), "--seed", "1", "--report", path("explain.html")}));
+    const std::string what_happened = "did anything happen about the release that the robot did not report?";
+    PRESCENE_TRY(
+        const std::string explained,
+        answered(what_happened, {"explain", path("session.mcap"), "--from", fixed_text(release.time - 0.2, 2), "--to",
+                                 fixed_text(release.time + 1.0, 2), "--seed", "1", "--report", path("explain.html")}));
+    PRESCENE_RETURN_IF_ERROR(interfaces::add_section(
+        path("report.html"),
+        {"Asked of the scene, and of the recorded session",
+         {interfaces::TextBlock{where_to_let_go}, interfaces::LinkBlock{first_lines(achieved, 2), "achieve.html"},
+          interfaces::TextBlock{what_happened}, interfaces::LinkBlock{first_lines(explained, 1), "explain.html"}}}));
     return step("replay the session that the service recorded: the same bits", {"replay", path("session.mcap")});
   }
 
@@ -149,6 +175,24 @@ class Demo {
   core::Status step(const std::string& text, const Arguments& arguments) {
     title(text);
     return verb(arguments);
+  }
+
+  /// As step(); what the verb printed, which goes where it would have gone when it has ended.
+  core::Result<std::string> answered(const std::string& text, const Arguments& arguments) {
+    title(text);
+    const std::string file = path(arguments[0] + ".txt");
+    PRESCENE_TRY(RunningVerb running, RunningVerb::start(with_common(arguments), context_.options().json, file));
+    const core::Status ended = running.wait(context_.cancellation());
+    const auto bytes = interfaces::read_file(file, kMostPrinted);
+    std::error_code ignored;
+    std::filesystem::remove(file, ignored);
+    if (!bytes) return ended.ok() ? bytes.status() : ended;
+    const std::string printed(bytes->begin(), bytes->end());
+    std::FILE* out = context_.options().json ? stderr : stdout;
+    std::fputs(printed.c_str(), out);
+    std::fflush(out);
+    if (!ended.ok()) return ended;
+    return printed;
   }
 
   core::Status live(const std::string& scene, const std::string& milk, const belief::Action& release) {

@@ -120,6 +120,7 @@ ReportContents everything(const std::string& text) {
       {{belief::Relation::kInside, text, text, 0.5, 1.5}, {belief::Relation::kMoving, text, "", 0.0, 1.0}},
       0.0,
       2.0});
+  section.blocks.push_back(LinkBlock{text, text});
   section.blocks.push_back(HeatMapBlock{text, small_map(), {{text, {{0.0, 0.3}, {0.1, 0.3}, {0.1, 0.4}}}}});
   contents.sections.push_back(section);
   return contents;
@@ -215,6 +216,35 @@ TEST(Report, AFileIsWrittenWholeOrNotAtAll) {
   const core::Status status = write_report(scratch.path() / "none" / "report.html", {});
   EXPECT_FALSE(status.ok());
   EXPECT_THAT(status.message(), HasSubstr("none"));
+}
+
+TEST(Report, ASectionIsAddedAsIfItHadBeenThere) {
+  const tests::ScratchDir scratch;
+  const std::filesystem::path path = scratch.path() / "report.html";
+  ReportContents contents = everything("carton");
+  ASSERT_TRUE(write_report(path, contents).ok());
+  const ReportSection section{"Asked <beside> it", {TextBlock{"where?"}, LinkBlock{"Here & there.", "achieve.html"}}};
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(add_section(path, section).ok());
+    contents.sections.push_back(section);
+    std::ifstream file(path, std::ios::binary);
+    const std::string read{std::istreambuf_iterator<char>(file), {}};
+    EXPECT_EQ(read, report_html(contents));
+    EXPECT_THAT(read, HasSubstr("<p>Here &amp; there. <a href=\"./achieve.html\">achieve.html</a></p>"));
+  }
+  EXPECT_EQ(add_section(scratch.path() / "none.html", section).code(), core::StatusCode::kNotFound);
+  std::ofstream(scratch.path() / "other.html") << "<html></html>\n";
+  const core::Status other = add_section(scratch.path() / "other.html", section);
+  EXPECT_EQ(other.code(), core::StatusCode::kInvalidInput);
+  EXPECT_THAT(other.message(), HasSubstr("other.html: it does not end as a report"));
+}
+
+TEST(Report, ALinkLeadsToAFileBesideThePage) {
+  ReportContents contents;
+  contents.sections.push_back({"", {LinkBlock{"", "javascript:alert(1)"}, LinkBlock{"", "a#b?c\"d%.html"}}});
+  const std::string page = report_html(contents);
+  EXPECT_THAT(page, HasSubstr("href=\"./javascript%3Aalert%281%29\""));
+  EXPECT_THAT(page, HasSubstr("href=\"./a%23b%3Fc%22d%25.html\""));
 }
 
 std::shared_ptr<belief::Scene> bin_scene() {

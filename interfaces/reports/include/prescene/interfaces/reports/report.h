@@ -30,6 +30,11 @@ namespace prescene::interfaces {
 struct TextBlock {
   std::string text;
 };
+/// A few sentences and a link to another page in the same folder.
+struct LinkBlock {
+  std::string text;
+  std::string file;  ///< Its name.
+};
 /// Pictures side by side, where the page is wide enough.
 struct PictureBlock {
   struct Picture {
@@ -104,7 +109,7 @@ struct HeatMapBlock {
   std::vector<Outline> outlines;
 };
 using ReportBlock = std::variant<TextBlock, PictureBlock, OutcomeBlock, TableBlock, ChartBlock, TornadoBlock,
-                                 TimelineBlock, StateBandBlock, HeatMapBlock>;
+                                 TimelineBlock, StateBandBlock, HeatMapBlock, LinkBlock>;
 
 struct ReportSection {
   std::string title;
@@ -123,6 +128,9 @@ struct ReportContents {
 std::string report_html(const ReportContents& contents);
 /// Writes it; fails with kUnavailable when the file can't be written, and keeps what was there.
 core::Status write_report(const std::filesystem::path& path, const ReportContents& contents);
+/// Adds a section at the end of a page that write_report() wrote. Errors of read_file(); kInvalidInput for another
+/// file; kUnavailable when it can't be written, and keeps what was there.
+core::Status add_section(const std::filesystem::path& path, const ReportSection& section);
 
 /// Sections that show an answer: outcomes, heat maps (with the outlines of the scene's supports), final poses,
 /// timelines of typical runs; or positions, stability, the foreseen view. An answer with an error becomes its text.
