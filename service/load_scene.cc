@@ -6,6 +6,7 @@
 #include <memory>
 #include <tuple>
 
+#include "lockstep_hull.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
@@ -229,6 +230,7 @@ core::Result<std::shared_ptr<const belief::Scene>> load_reported_scene(const std
   MeshRemarks remarks(log, Repairs::kEach);
   auto scene = interfaces::parse_scene(text, path.string(), with(options(remarks, path), symmetries), &report);
   if (scene) remark_on_large_surroundings(*scene, path, report);
+  if (scene && symmetries == Symmetries::kSuggested) remark_on_simplified_hulls(*scene, path.string(), report);
   return shared(std::move(scene), report, log);
 }
 
@@ -270,6 +272,7 @@ core::Result<belief::ObjectModel> load_reported_model(const std::filesystem::pat
   MeshRemarks remarks(log, Repairs::kEach);
   core::Result<belief::ObjectModel> model =
       interfaces::read_model(path, path.stem().string(), with(options(remarks), symmetries), &report);
+  if (model && symmetries == Symmetries::kSuggested) remark_on_simplified_hulls(*model, path.string(), report);
   log_warnings(report, log);
   return model;
 }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "lockstep_hull.h"
 #include "prescene/core/text.h"
 #include "prescene/geometry/angles.h"
 #include "prescene/geometry/cancellable.h"
@@ -220,6 +221,10 @@ core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, con
   PRESCENE_RETURN_IF_ERROR(check_sizes(found));
   if (auto remark = hollow_remark(found, options)) found.remarks.push_back(*std::move(remark));
 
+  PRESCENE_RETURN_IF_ERROR(steps.begin(0.65, "simplified hull"));
+  if (hull) {
+    if (const auto simplified = lockstep_hull(*hull)) found.lockstep_hull = *simplified;
+  }
   PRESCENE_RETURN_IF_ERROR(steps.begin(0.75, "symmetry"));
   const double radius = 0.5 * found.box.diagonal().norm();
   found.symmetry = geometry::suggest_symmetry(mesh, options.symmetry_tolerance * radius);
@@ -262,6 +267,10 @@ ordered_json to_json(const MeshInspection& found) {
   json["hull"] = found.hull_mass ? mass_json(*found.hull_mass) : ordered_json();
   json["volume"] = found.mass ? ordered_json(found.mass->mass / found.density) : ordered_json();
   json["hollow_share_of_hull"] = found.hollow ? ordered_json(*found.hollow) : ordered_json();
+  json["lockstep_hull"] = found.lockstep_hull ? ordered_json({{"vertices", found.lockstep_hull->vertices},
+                                                              {"kept", found.lockstep_hull->kept},
+                                                              {"error", found.lockstep_hull->error}})
+                                              : ordered_json();
   json["symmetry"] = symmetry_text(found.symmetry);
   json["resting_poses"] = poses;
   json["remarks"] = found.remarks;

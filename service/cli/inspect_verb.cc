@@ -82,6 +82,9 @@ std::string text_of(const MeshInspection& found) {
             fixed_text(found.density, 0) + " kg/m^3, centre of mass (" + fixed_text(com.x(), 4) + ", " +
             fixed_text(com.y(), 4) + ", " + fixed_text(com.z(), 4) + ") m\n";
   }
+  if (const auto& hull = found.lockstep_hull; hull && hull->error > 0.0)
+    text += "convex hull: " + std::to_string(hull->vertices) + " vertices, in lockstep " + std::to_string(hull->kept) +
+            ", which stay up to " + fixed_text(1e3 * hull->error, 2) + " mm behind\n";
   text += "symmetry: " + symmetry_text(found.symmetry) + "\n";
   if (!found.resting_poses.empty()) {
     std::vector<std::vector<std::string>> rows = {

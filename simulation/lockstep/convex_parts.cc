@@ -14,7 +14,8 @@ namespace {
 using geometry::Matrix3d;
 using geometry::Pose;
 
-constexpr PolytopeLimits kLimits{64, kMaxLoop};
+constexpr PolytopeLimits kLimits{};
+static_assert(kLimits.corners == std::size_t{kMaxLoop});
 
 /// Where a body's parts go: from the frame that shapes are given in to that of the lanes.
 struct Placement {

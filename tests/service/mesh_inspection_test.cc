@@ -3,8 +3,15 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
+#include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/scene_report.h"
 #include "tests/support/paths.h"
 
 namespace prescene::service {
@@ -157,6 +164,119 @@ TEST(MeshInspection, TellsWhatIsInsideOut) {
   EXPECT_THAT(remarks_on(geometry::joined(box(0.1, 0.0), inside_out(box(0.04, 0.0)))),
               testing::Not(testing::HasSubstr("inside out")))
       << "a cavity";
+}
+
+/// The hull of points that lie about evenly on a ball, on a spiral; so little beside it that no two are alike.
+geometry::TriangleMesh fine_ball(double radius, int points) {
+  std::vector<Vector3d> on_it;
+  core::RandomStream stream(1, core::Purpose::kTest);
+  for (int i = 0; i < points; ++i) {
+    const double z = 1.0 - (2.0 * i + 1.0 + stream.uniform(-0.2, 0.2)) / points, across = std::sqrt(1.0 - z * z);
+    const double angle = std::numbers::pi * (3.0 - std::sqrt(5.0)) * i;
+    on_it.push_back(radius * Vector3d(across * std::cos(angle), across * std::sin(angle), z));
+  }
+  return *geometry::convex_hull(on_it);
+}
+
+/// m: of the largest ball about the origin that is inside of the convex mesh.
+double inscribed_radius(const geometry::TriangleMesh& mesh) {
+  double least = 1e9;
+  for (const auto& t : mesh.triangles) {
+    const Vector3d& a = mesh.vertices[t[0]];
+    least = std::min(least, (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a).normalized().dot(a));
+  }
+  return least;
+}
+
+TEST(MeshInspection, SaysHowFarASimplifiedHullStaysBehind) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "ball.ply";
+  for (const int points : {1000, 3000}) {  // Of more than 1500, both steppers leave out some.
+    const double radius = 0.05, rounding = 2e-4;
+    const geometry::TriangleMesh ball = fine_ball(radius, points);
+    ASSERT_TRUE(interfaces::write_ply(path, ball).ok());
+    const auto found = inspect_mesh(path, {});
+    ASSERT_TRUE(found.ok() && found->lockstep_hull) << found.status().message();
+    const LockstepHull& hull = *found->lockstep_hull;
+    EXPECT_EQ(hull.vertices, static_cast<std::size_t>(points));
+    EXPECT_LE(hull.kept, 64U);
+    // Of all polyhedra with n vertices in a ball, none has an inscribed ball of more than 1 / (sqrt(3) tan w) of its
+    // radius, w = pi n / (6 (n - 2)) [Fejes Toth 1953]: a face is as near, and the mesh reaches as far as the ball in
+    // it.
+    const double w = std::numbers::pi / 6.0 * 64.0 / 62.0;
+    const double best = (radius - rounding) / (std::sqrt(3.0) * std::tan(w)) + rounding;
+    EXPECT_GT(hull.error, inscribed_radius(ball) - best) << points;
+    EXPECT_LT(hull.error, 4.5 * (radius - best)) << points;
+    const auto json = to_json(*found)["lockstep_hull"];
+    EXPECT_EQ(json["vertices"].get<std::size_t>(), hull.vertices);
+    EXPECT_EQ(json["kept"].get<std::size_t>(), hull.kept);
+    EXPECT_EQ(json["error"].get<double>(), hull.error);
+  }
+}
+
+/// What lockstep itself says.
+double simulated_error(const belief::Scene& scene) {
+  core::ThreadPool pool(1);
+  BackendSettings settings;
+  settings.stepper = Stepper::kLockstep;
+  Backends backends(pool, settings);
+  const auto simulator = backends.make_simulator(scene);
+  EXPECT_TRUE(simulator.ok()) << simulator.status().message();
+  return simulator ? (*simulator)->stepper().hull_error : -1.0;
+}
+
+TEST(MeshInspection, ASimplifiedHullIsTheOneThatIsSimulated) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "thing.ply";
+  const geometry::TriangleMesh can = geometry::make_mesh(geometry::Cylinder{0.03, 0.1}, 48);
+  // Small things are simulated as similar ones of household size; a box is its hull.
+  for (const auto& mesh : {fine_ball(0.05, 1000), fine_ball(0.004, 1000), can,
+                           geometry::make_mesh(geometry::BoxShape{Vector3d(0.05, 0.1, 0.2)})}) {
+    ASSERT_TRUE(interfaces::write_ply(path, mesh).ok());
+    const auto found = inspect_mesh(path, {});
+    ASSERT_TRUE(found.ok() && found->lockstep_hull) << found.status().message();
+    const auto scene = load_scene_text(
+        "models: {m: {mesh: {file: thing.ply, use: convex_hull}, mass: 0.1}}\n"
+        "supports: {floor: {ground: {size: 4}}}\nobjects: {m: {model: m, pose: {position: [0, 0, 1]}}}\n",
+        folder.path() / "scene.yaml", {});
+    ASSERT_TRUE(scene.ok()) << scene.status().message();
+    const double error = found->lockstep_hull->error;
+    EXPECT_NEAR(error, simulated_error(**scene), 1e-9) << mesh.vertices.size();
+    EXPECT_EQ(error > 0.0, mesh.vertices.size() > 64) << mesh.vertices.size();
+    if (error == 0.0) {
+      EXPECT_EQ(found->lockstep_hull->kept, found->lockstep_hull->vertices);
+    }
+  }
+}
+
+TEST(MeshInspection, ValidationRemarksOnHullsThatStayBehind) {
+  const tests::ScratchDir folder;
+  ASSERT_TRUE(interfaces::write_ply(folder.path() / "ball.ply", fine_ball(0.05, 1000)).ok());
+  ASSERT_TRUE(interfaces::write_ply(folder.path() / "box.ply",
+                                    geometry::make_mesh(geometry::BoxShape{Vector3d(0.05, 0.1, 0.2)}))
+                  .ok());
+  const auto remarks_on = [&](const std::string& mesh, const std::string& shape, Symmetries symmetries) {
+    interfaces::FileReport report;
+    const auto scene = load_reported_scene("models: {m: {mesh: {file: " + mesh + "}, mass: 0.1, symmetry: none}}\n" +
+                                               "supports: {s: {" + shape + "}}\n" +
+                                               "objects: {m: {model: m, pose: {position: [0, 0, 1]}}}\n",
+                                           folder.path() / "scene.yaml", {}, report, symmetries);
+    EXPECT_TRUE(scene.ok()) << scene.status().message();
+    std::string text;
+    for (const interfaces::Problem& remark : report.remarks) text += remark.text() + "\n";
+    return text;
+  };
+  const std::string ground = "ground: {size: 4}", ball = "mesh: {file: ball.ply, use: convex_hull}";
+  EXPECT_THAT(
+      remarks_on("ball.ply", ground, Symmetries::kSuggested),
+      testing::AllOf(testing::HasSubstr("models.m: in lockstep its convex hull is simplified to at most 64 vertices"),
+                     testing::HasSubstr("describe it as a sphere"), testing::Not(testing::HasSubstr("supports.s"))));
+  EXPECT_THAT(
+      remarks_on("box.ply", ball, Symmetries::kSuggested),
+      testing::AllOf(testing::HasSubstr("supports.s: in lockstep"), testing::Not(testing::HasSubstr("models."))));
+  EXPECT_EQ(remarks_on("box.ply", ground, Symmetries::kSuggested), "");
+  EXPECT_EQ(remarks_on("ball.ply, use: spheres", ground, Symmetries::kSuggested), "") << "no hull";
+  EXPECT_EQ(remarks_on("ball.ply", ball, Symmetries::kAsWritten), "") << "nobody asked";
 }
 
 TEST(MeshInspection, AModelThatNoSceneCouldUseIsNotMade) {

@@ -679,6 +679,31 @@ TEST(CommandLine, WhatFallsIntoAnInspectedMugLandsInIt) {
   EXPECT_NE(misses.err.find("76 % of its convex hull is hollow"), std::string::npos) << misses.err;
 }
 
+TEST(CommandLine, EachStepperSaysWhichHullsItSimplifies) {
+  const ScratchDir folder;
+  const auto file = [&](const std::string& name) { return (folder.path() / name).string(); };
+  write_file(file("scene.yaml"),
+             "name: ball\nduration: 0.1\nmodels:\n  ball: {mesh: {file: ball.ply, use: convex_hull}, mass: 0.1}\n"
+             "supports:\n  floor: {ground: {size: 2}}\nobjects:\n  ball: {model: ball, pose: {position: [0, 0, 1]}}\n");
+  const auto said = [&](int segments, const std::string& stepper) {
+    EXPECT_TRUE(interfaces::write_ply(file("ball.ply"), geometry::make_mesh(geometry::Sphere{0.05}, segments)).ok());
+    const Finished done = run_program({"predict", file("scene.yaml"), "--max-instances", "2", "--stepper", stepper});
+    EXPECT_EQ(done.exit_code, 0) << done.err;
+    return done.out;
+  };
+  const std::string few = "Hulls of more than 64 vertices, or 16 corners a side, are simplified, here by up to ";
+  const std::string many = "Bullet's stepper simplifies hulls of more than 1500 vertices, here by up to 0.";
+  for (const int segments : {40, 80}) {  // about 760 and 3100 vertices
+    const std::string lockstep = said(segments, "lockstep"), bullet = said(segments, "bullet");
+    EXPECT_NE(lockstep.find(few), std::string::npos) << lockstep;
+    EXPECT_EQ(lockstep.find(many), std::string::npos) << lockstep;
+    EXPECT_EQ(bullet.find(few), std::string::npos) << bullet;
+    EXPECT_EQ(bullet.find(many) != std::string::npos, segments == 80) << bullet;
+  }
+  const std::string inspected = run_program({"inspect", file("ball.ply")}).out;
+  EXPECT_NE(inspected.find(" vertices, in lockstep "), std::string::npos) << inspected;
+}
+
 TEST(CommandLine, AMeshInMillimetresIsSaidFirst) {
   const ScratchDir folder;
   const auto file = [&](const std::string& name) { return (folder.path() / name).string(); };

@@ -28,6 +28,13 @@ struct MeshInspectionOptions {
   core::ProgressSink progress;  ///< May be empty. `read.cancellation` stops all steps.
 };
 
+/// What the lockstep stepper makes of a mesh that collides as its convex hull (docs/reference/simulation.md).
+struct LockstepHull {
+  std::size_t vertices = 0;  ///< Of the hull.
+  std::size_t kept = 0;      ///< Of the hull that is simulated.
+  double error = 0.0;  ///< m, how far that stays behind at most (simulation::RoundedPolytope); 0 = it is the hull.
+};
+
 struct MeshInspection {
   std::filesystem::path path;
   interfaces::LoadedMesh loaded;
@@ -43,6 +50,7 @@ struct MeshInspection {
   std::vector<geometry::RestingPose> resting_poses;  ///< Likeliest first; empty for a flat mesh.
   /// Of a closed mesh the share of its convex hull that is hollow, see interfaces::hidden_hollow().
   std::optional<double> hollow;
+  std::optional<LockstepHull> lockstep_hull;  ///< Empty for a flat mesh.
   std::optional<std::string> doubtful_scale;  ///< A sentence for a person, see interfaces::scale_hint().
   std::vector<std::string> remarks;           ///< Sentences for a person: hollows that get lost, holes, repairs.
 };

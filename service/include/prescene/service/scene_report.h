@@ -19,7 +19,8 @@
 namespace prescene::service {
 
 /// load_scene_text, with the problems that its status lists and those that were logged. What was tidied up in meshes is
-/// logged of each. Remarks (Symmetries::kSuggested) are in the report and not logged.
+/// logged of each. Remarks (Symmetries::kSuggested, which asks for those on simplified hulls, too) are in the report
+/// and not logged.
 core::Result<std::shared_ptr<const belief::Scene>> load_reported_scene(const std::string& text,
                                                                        const std::filesystem::path& path,
                                                                        const core::LogSink& log,

@@ -12,6 +12,7 @@
 
 namespace prescene::simulation {
 
+/// Those of the lockstep stepper by default.
 struct PolytopeLimits {
   std::size_t vertices = 64;  ///< >= 16
   std::size_t corners = 16;   ///< Of a face; >= 4.
