@@ -30,7 +30,9 @@ PATH=$2:$PATH
 # So that a failing command in between does not leave the service running.
 sed -e 's|^prescene serve .*&$|&\necho $! > ../server|' -e 's|^wait \$!$|&\nrm ../server|' "$work/commands" > "$work/script"
 code=0
-ROS_DOMAIN_ID=$((10 + $$ % 200)) sh -eu "$work/script" > "$work/printed" 2> "$work/log" || code=$?
+. "$1/tests/support/take_domain.sh"
+take_domain
+ROS_DOMAIN_ID=$domain sh -eu "$work/script" > "$work/printed" 2> "$work/log" || code=$?
 if [ "$code" != 0 ]; then
   echo "a command of the page fails with exit code $code"
   cat "$work/printed" "$work/log" serve.log

@@ -2,7 +2,6 @@
 // Two cameras on the bus, each a participant of its own, before the live service.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -16,6 +15,7 @@
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/recording/replay.h"
 #include "tests/service/robot_on_bus.h"
+#include "tests/support/bus_domain.h"
 #include "tests/support/paths.h"
 
 namespace prescene::service::cameras_on_bus_test {
@@ -40,8 +40,6 @@ cameras:
   - {name: side, width: 80, height: 60, fov_deg: 55, look: {from: [-0.55, -0.5, 0.5], at: [0, 0, 0.03]}}
 )";
 
-int own_domain() { return 10 + static_cast<int>(getpid() % 200); }
-
 InputTopics topics_of(const std::string& camera) {
   InputTopics topics;
   topics.depth = "/" + camera + "/aligned_depth_to_color/image_raw";
@@ -65,11 +63,11 @@ class CamerasOnBus : public testing::Test {
   }
 
   static std::unique_ptr<tests::RobotOnBus> camera(const std::string& name) {
-    return std::make_unique<tests::RobotOnBus>(kScene, own_domain(), topics_of(name));
+    return std::make_unique<tests::RobotOnBus>(kScene, tests::own_domain(), topics_of(name));
   }
   void start(std::unique_ptr<RollingRecording> recording = nullptr) {
     LiveSettings settings;
-    settings.dds.domain = own_domain();
+    settings.dds.domain = tests::own_domain();
     settings.diagnostics_rate = 50.0;
     auto service = LiveService::create(scene_, settings, 1, backends_, std::move(recording), {});
     ASSERT_TRUE(service.ok()) << service.status().message();
@@ -150,7 +148,7 @@ TEST_F(CamerasOnBus, AreRecordedAndReplayedToTheSameBits) {
 
 TEST_F(CamerasOnBus, AreBothLookedAtByTheDoctor) {
   DoctorOptions options;
-  options.dds.domain = own_domain();
+  options.dds.domain = tests::own_domain();
   options.seconds = 1.0;
   std::atomic<bool> done = false;
   std::thread sender([&] { sends_until([&] { return done.load(); }); });

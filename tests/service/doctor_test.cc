@@ -3,19 +3,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <thread>
 
 #include "tests/service/robot_on_bus.h"
+#include "tests/support/bus_domain.h"
 
 namespace prescene::service::doctor_test {
 namespace {
 
 using testing::HasSubstr;
-
-int own_domain() { return 10 + static_cast<int>(getpid() % 200); }
 
 const DoctorCheck* find(const Diagnosis& diagnosis, const std::string& name) {
   for (const DoctorCheck& check : diagnosis.checks)
@@ -28,7 +26,7 @@ class DoctorTest : public ::testing::Test {
   DoctorTest() {
     const auto scene = load_scene_text(tests::kBoxScene, "box.yaml", {});
     if (scene) scene_ = *scene;
-    options_.dds.domain = own_domain();
+    options_.dds.domain = tests::own_domain();
     options_.seconds = 1.0;
   }
   core::Result<Diagnosis> examine() { return examine_bus(options_, scene_, backends_, {}, {}, {}); }
@@ -51,7 +49,7 @@ class DoctorTest : public ::testing::Test {
 
 TEST_F(DoctorTest, FindsARobotUsableAndDrawsTheScene) {
   ASSERT_NE(scene_, nullptr);
-  tests::RobotOnBus robot(tests::kBoxScene, own_domain());
+  tests::RobotOnBus robot(tests::kBoxScene, tests::own_domain());
   ASSERT_TRUE(robot.good());
   const auto diagnosis = examine(robot);
   ASSERT_TRUE(diagnosis.ok()) << diagnosis.status().message();
@@ -79,7 +77,7 @@ TEST_F(DoctorTest, SeesATableThatIsNotWhereTheSceneFileSays) {
   belief::Scene lower = *scene_;
   lower.supports[0].X_WS.translation.z() -= 0.08;
   scene_ = std::make_shared<const belief::Scene>(lower);
-  tests::RobotOnBus robot(tests::kBoxScene, own_domain());
+  tests::RobotOnBus robot(tests::kBoxScene, tests::own_domain());
   ASSERT_TRUE(robot.good());
   const auto diagnosis = examine(robot);
   ASSERT_TRUE(diagnosis.ok()) << diagnosis.status().message();
@@ -112,7 +110,7 @@ TEST_F(DoctorTest, SaysHowSimulatedTimeGoesAndThatItIsTold) {
     EXPECT_EQ(check->status, CheckStatus::kError);
     EXPECT_EQ(check->what, "nothing has come on /clock");
   }
-  tests::RobotOnBus robot(tests::kBoxScene, own_domain());
+  tests::RobotOnBus robot(tests::kBoxScene, tests::own_domain());
   ASSERT_TRUE(robot.good());
   robot.send_clock(0);
   for (const std::string clock : {kClockTopic, ""}) {

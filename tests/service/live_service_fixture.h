@@ -3,7 +3,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <memory>
 #include <mutex>
@@ -15,14 +14,12 @@
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/load_scene.h"
 #include "tests/service/robot_on_bus.h"
+#include "tests/support/bus_domain.h"
 
 namespace prescene::service {
 
 inline constexpr core::TimeNs kSecond = 1'000'000'000;
 inline constexpr core::TimeNs kNoon = 1'700'000'000 * kSecond;
-
-/// Each process in one of its own.
-inline int own_domain() { return 10 + static_cast<int>(getpid() % 200); }
 
 class LiveServiceTest : public ::testing::Test {
  protected:
@@ -38,7 +35,7 @@ class LiveServiceTest : public ::testing::Test {
     const auto scene = load_scene_text(scene_yaml, "box.yaml", {});
     ASSERT_TRUE(scene.ok()) << scene.status().message();
     LiveSettings settings;
-    settings.dds.domain = own_domain();
+    settings.dds.domain = tests::own_domain();
     settings.diagnostics_rate = 50.0;
     settings.tracker.topics.clock = clock;
     settings.learned_file = learned_file_;
@@ -87,7 +84,7 @@ class LiveServiceTest : public ::testing::Test {
 
   core::ThreadPool pool_{1};
   Backends backends_{pool_};
-  tests::RobotOnBus robot_{tests::kBoxScene, own_domain()};
+  tests::RobotOnBus robot_{tests::kBoxScene, tests::own_domain()};
   std::mutex log_mutex_;
   std::vector<std::string> log_;
   core::Cancellation cancellation_;

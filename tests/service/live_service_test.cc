@@ -70,7 +70,7 @@ TEST_F(LiveServiceTest, TracksPublishesAndAnswers) {
 TEST_F(LiveServiceTest, ServicesAnswerAndRestart) {
   start();
   ASSERT_TRUE(tracks_from(kNoon, 6));
-  tests::ServiceClient where(own_domain(), "/prescene/where");
+  tests::ServiceClient where(tests::own_domain(), "/prescene/where");
   ASSERT_TRUE(where.wait_for_service());
   const auto known = where.call();
   ASSERT_TRUE(known.has_value());
@@ -78,12 +78,12 @@ TEST_F(LiveServiceTest, ServicesAnswerAndRestart) {
   const auto json = nlohmann::ordered_json::parse(known->text);
   EXPECT_FALSE(json.contains("id"));
   EXPECT_EQ(json.at("where").at("items").at(0).at("object"), "box") << known->text;
-  tests::ServiceClient relations(own_domain(), "/prescene/relations");
+  tests::ServiceClient relations(tests::own_domain(), "/prescene/relations");
   ASSERT_TRUE(relations.wait_for_service());
   const auto related = relations.call();
   ASSERT_TRUE(related.has_value());
   EXPECT_TRUE(related->success) << related->text;
-  tests::ServiceClient ask(own_domain(), "/prescene/ask", true);
+  tests::ServiceClient ask(tests::own_domain(), "/prescene/ask", true);
   ASSERT_TRUE(ask.wait_for_service());
   const auto asked = ask.call(R"({"where": {"object": "box"}})");
   ASSERT_TRUE(asked.has_value());
@@ -94,13 +94,13 @@ TEST_F(LiveServiceTest, ServicesAnswerAndRestart) {
     EXPECT_FALSE(refused->success) << nonsense;
     EXPECT_THAT(refused->text, HasSubstr("\"error\"")) << nonsense;
   }
-  tests::ServiceClient save(own_domain(), "/prescene/save_learned");
+  tests::ServiceClient save(tests::own_domain(), "/prescene/save_learned");
   ASSERT_TRUE(save.wait_for_service());
   const auto saved = save.call();
   ASSERT_TRUE(saved.has_value());
   EXPECT_FALSE(saved->success);
   EXPECT_THAT(saved->text, HasSubstr("--learned FILE"));
-  tests::ServiceClient restart(own_domain(), "/prescene/restart");
+  tests::ServiceClient restart(tests::own_domain(), "/prescene/restart");
   ASSERT_TRUE(restart.wait_for_service());
   const std::size_t before = robot_.beliefs().size();
   const auto restarted = restart.call();
@@ -123,7 +123,7 @@ TEST_F(LiveServiceTest, AServiceSavesWhatWasLearned) {
   learned_file_ = file.string();
   start();
   ASSERT_TRUE(tracks_from(kNoon));
-  tests::ServiceClient save(own_domain(), "/prescene/save_learned");
+  tests::ServiceClient save(tests::own_domain(), "/prescene/save_learned");
   ASSERT_TRUE(save.wait_for_service());
   const auto saved = save.call();
   ASSERT_TRUE(saved.has_value());
@@ -237,7 +237,7 @@ TEST_F(LiveServiceTest, TellsOfAnotherServiceInItsDomainWhileItIsThere) {
   };
   EXPECT_TRUE(others("0"));
   interfaces::DdsOptions options;
-  options.domain = own_domain();
+  options.domain = tests::own_domain();
   auto other = interfaces::DdsNode::create(options, {});
   ASSERT_TRUE(other.ok()) << other.status().message();
   ASSERT_TRUE((*other)->advertise(kBeliefTopic, "std_msgs/msg/String", interfaces::TopicQos::kState).ok());
@@ -253,7 +253,7 @@ TEST_F(LiveServiceTest, AReplayThatFailsEndsWhileTheServiceSpeaks) {
   start();
   ASSERT_TRUE(tracks_from(kNoon));
   BusReplayOptions options;
-  options.dds.domain = own_domain();
+  options.dds.domain = tests::own_domain();
   const tests::ScratchDir folder;
   EXPECT_TRUE(robot_.send_until(
       [&, tries = 0]() mutable {
@@ -271,7 +271,7 @@ TEST_F(LiveServiceTest, AReplayStopsInAPauseAndWhileItWaitsForAService) {
   const core::Status recorded = tests::record_scene(tests::kBoxScene, {}, 10.0, path);
   ASSERT_TRUE(recorded.ok()) << recorded.message();
   BusReplayOptions options;
-  options.dds.domain = own_domain();
+  options.dds.domain = tests::own_domain();
   options.wait_for_service = 1e9;
   core::Cancellation stop_waiting;
   stop_waiting.request();

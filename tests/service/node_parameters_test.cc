@@ -192,7 +192,7 @@ class ParametersOnBus : public LiveServiceTest {
     EXPECT_EQ(robot_.diagnostics()["failures"], "0");
     EXPECT_TRUE(stop().ok());
   }
-  ParameterClient client_{own_domain(), "/prescene"};
+  ParameterClient client_{tests::own_domain(), "/prescene"};
 };
 
 TEST_F(ParametersOnBus, AreListedDescribedAndRead) {
@@ -216,7 +216,7 @@ TEST_F(ParametersOnBus, AreListedDescribedAndRead) {
   }
   EXPECT_EQ(value("depth_topic"), ParamValue::of("/camera/aligned_depth_to_color/image_raw"));
   EXPECT_EQ(value("use_sim_time"), ParamValue::of(false));
-  EXPECT_EQ(value("domain"), ParamValue::of(std::int64_t{own_domain()}));
+  EXPECT_EQ(value("domain"), ParamValue::of(std::int64_t{tests::own_domain()}));
   EXPECT_EQ(value("history"), ParamValue::of(20.0));
   EXPECT_EQ(value("no_such"), ParamValue{});
   const auto history = client_.describe({"history"});
@@ -230,7 +230,7 @@ TEST_F(ParametersOnBus, AreSetToldOfAndTakeEffect) {
   std::mutex mutex;
   std::vector<interfaces::RosParameterEvent> events;
   interfaces::DdsOptions options;
-  options.domain = own_domain();
+  options.domain = tests::own_domain();
   auto listener = interfaces::DdsNode::create(options, {});
   ASSERT_TRUE(listener.ok()) << listener.status().message();
   ASSERT_TRUE((*listener)
@@ -265,7 +265,7 @@ TEST_F(ParametersOnBus, AreSetToldOfAndTakeEffect) {
   EXPECT_EQ(events[0].changed_parameters[0], wish("history", 30.0));
   EXPECT_EQ(events[1].changed_parameters[0], wish("history", 0.0));
   ASSERT_TRUE(tracks_from(kNoon + 10 * kSecond));
-  tests::ServiceClient ask(own_domain(), "/prescene/ask", true);
+  tests::ServiceClient ask(tests::own_domain(), "/prescene/ask", true);
   ASSERT_TRUE(ask.wait_for_service());
   const auto explained = ask.call(R"({"explain": {}})");
   ASSERT_TRUE(explained.has_value());

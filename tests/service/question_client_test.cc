@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <unistd.h>
 #include <nlohmann/json.hpp>
 
 #include <memory>
@@ -16,6 +15,7 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/tracking/topics.h"
+#include "tests/support/bus_domain.h"
 
 namespace prescene::service::question_client_test {
 namespace {
@@ -26,7 +26,7 @@ constexpr double kPatience = 60.0;  // s
 
 interfaces::DdsOptions options() {
   interfaces::DdsOptions options;
-  options.domain = 10 + static_cast<int>(getpid() % 200);
+  options.domain = tests::own_domain();
   return options;
 }
 

@@ -258,7 +258,7 @@ TEST(CommandLine, InputThatCannotBeUsedEndsWithTwo) {
                                              {"train", file("none.yaml"), "-o", file("p.bin")},
                                              {"train", file("bad.yaml"), "-o", file("p.bin")},
                                              {"evaluate", "finding", "--proposals", file("bad.ply")}}) {
-    const Finished finished = run_program(args, {own_domain()});
+    const Finished finished = run_program(args, {own_bus()});
     EXPECT_EQ(finished.exit_code, 2) << args[0] << " " << args[1] << ": " << finished.err;
     EXPECT_NE(finished.err.find("prescene " + args[0]), std::string::npos) << finished.err;
   }
@@ -269,7 +269,7 @@ TEST(CommandLine, DoctorSaysWhatIsMissingAndEndsWithOne) {
   const std::string scene = (folder.path() / "box.yaml").string();
   write_file(scene, kOneBox);
   const Finished finished = run_program(
-      {"doctor", scene, "--seconds", "0.5", "--camera", "zed", "--color-topic", "/mine", "--json"}, {own_domain()});
+      {"doctor", scene, "--seconds", "0.5", "--camera", "zed", "--color-topic", "/mine", "--json"}, {own_bus()});
   EXPECT_EQ(finished.exit_code, 1) << finished.err;
   EXPECT_NE(finished.err.find("depth /zed/zed_node/depth/depth_registered, colour /mine,"), std::string::npos)
       << "what is named by itself takes precedence: " << finished.err;
@@ -285,7 +285,7 @@ TEST(CommandLine, DoctorSaysWhatIsMissingAndEndsWithOne) {
   EXPECT_EQ(checks["depth image"]["status"], "error");
 
   write_file(scene, "name: [1\n");
-  const Finished wrong = run_program({"doctor", scene, "--seconds", "0.5"}, {own_domain()});
+  const Finished wrong = run_program({"doctor", scene, "--seconds", "0.5"}, {own_bus()});
   EXPECT_EQ(wrong.exit_code, 1);
   EXPECT_NE(wrong.out.find("box.yaml:"), std::string::npos) << wrong.out;
   for (const std::vector<std::string>& args :
@@ -295,7 +295,7 @@ TEST(CommandLine, DoctorSaysWhatIsMissingAndEndsWithOne) {
                                              {"doctor", "--depth-form", "png"},
                                              {"doctor", "--overlay", "seen.png"},
                                              {"doctor", "--depth-topic", "/a", "--camera-info-topic", "/a"}}) {
-    const Finished refused = run_program(args, {own_domain()});
+    const Finished refused = run_program(args, {own_bus()});
     EXPECT_EQ(refused.exit_code, 2) << args[1] << ": " << refused.err;
   }
 }
@@ -316,7 +316,7 @@ TEST(CommandLine, OutputThatCannotBeWrittenEndsWithOneAndIsNamed) {
                                                {"inspect", file("box.ply"), "--report", out + ".html"},
                                                {"record", "-o", out + ".mcap"},
                                                {"serve", "--scene", file("box.yaml"), "--record", out + ".mcap"}}) {
-      const Finished finished = run_program(args, {own_domain()});
+      const Finished finished = run_program(args, {own_bus()});
       EXPECT_EQ(finished.exit_code, 1) << args[0] << " " << args[2] << ": " << finished.err;
       EXPECT_NE(finished.err.find(args.back() + ": "), std::string::npos) << finished.err;
       EXPECT_EQ(finished.err.find(".partial"), std::string::npos) << finished.err;

@@ -6,7 +6,6 @@
 // The flood lasts PRESCENE_FLOOD_SECONDS (default 4; 30 for the figures of docs/reference/ros2.md).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
@@ -21,6 +20,7 @@
 #include "prescene/service/belief_summary.h"
 #include "program.h"
 #include "tests/service/robot_on_bus.h"
+#include "tests/support/bus_domain.h"
 #include "tests/support/paths.h"
 #include "tests/support/sanitizers.h"
 
@@ -137,7 +137,7 @@ class Flood : public ::testing::Test {
 
   std::mt19937_64 random_{7};
   ScratchDir folder_;
-  int domain_ = 10 + static_cast<int>(getpid() % 200);
+  int domain_ = own_domain();
   RobotOnBus robot_{kBoxScene, domain_};
   std::int64_t shift_s_ = 0;
   int asked_ = 0;

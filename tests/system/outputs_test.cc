@@ -90,7 +90,7 @@ TEST_F(Outputs, PipesDevicesAndNamesThatCannotBeAreRefusedBeforeTheWork) {
     for (const std::string& place : {path("pipe"), path("."), std::string("/dev/stdout"), std::string("/dev/null")}) {
       std::vector<std::string> with = args;
       with.insert(with.end(), {args[0] == "serve" ? "--record" : "-o", place});
-      const Finished refused = run_program(with, {own_domain()});
+      const Finished refused = run_program(with, {own_bus()});
       EXPECT_EQ(refused.exit_code, 2) << args[0] << " " << place;
       EXPECT_NE(refused.err.find("a recording is a file of its own"), std::string::npos) << refused.err;
     }

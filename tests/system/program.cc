@@ -14,6 +14,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "tests/support/bus_domain.h"
 #include "tests/support/paths.h"
 
 extern char** environ;
@@ -127,6 +128,6 @@ std::string read_file(const std::filesystem::path& path) {
   return text.str();
 }
 
-std::string own_domain() { return "ROS_DOMAIN_ID=" + std::to_string(10 + getpid() % 200); }
+std::string own_bus() { return "ROS_DOMAIN_ID=" + std::to_string(own_domain()); }
 
 }  // namespace prescene::tests

@@ -54,7 +54,7 @@ class BackgroundProgram {
 void write_file(const std::filesystem::path& path, const std::string& text);
 std::string read_file(const std::filesystem::path& path);
 
-/// A domain that other runs on this machine hardly use: "ROS_DOMAIN_ID=n".
-std::string own_domain();
+/// The domain of this process (tests/support/bus_domain.h) for the environment: "ROS_DOMAIN_ID=n".
+std::string own_bus();
 
 }  // namespace prescene::tests

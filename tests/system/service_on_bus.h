@@ -13,6 +13,7 @@
 
 #include "program.h"
 #include "tests/service/robot_on_bus.h"
+#include "tests/support/bus_domain.h"
 #include "tests/support/paths.h"
 
 namespace prescene::tests {
@@ -55,7 +56,7 @@ class ServiceOnBus : public ::testing::Test {
 
   const std::string scene_;
   ScratchDir folder_;
-  int domain_ = 10 + static_cast<int>(getpid() % 200);
+  int domain_ = own_domain();
   std::unique_ptr<RobotOnBus> robot_;
   core::TimeNs shift_ns_ = 0;
   std::uint64_t frames_sent_ = 0;

@@ -64,7 +64,7 @@ class Session : public ::testing::Test {
   std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
 
   ScratchDir folder_;
-  std::vector<std::string> bus_ = {own_domain()};
+  std::vector<std::string> bus_ = {own_bus()};
 };
 
 TEST_F(Session, ARecordingTracksToTheSameBytesOnAnyThreads) {

@@ -28,7 +28,7 @@ TEST(ViewVerb, APortInUseIsNamedWithTheRemedy) {
   const std::string port = std::to_string((*taken)->port());
   for (const std::vector<std::string>& args :
        {std::vector<std::string>{"view", recording, "--port", port, "--json"}, {"view", "--port", port, "--json"}}) {
-    const Finished finished = run_program(args, {own_domain()});
+    const Finished finished = run_program(args, {own_bus()});
     EXPECT_EQ(finished.exit_code, 1) << finished.err;
     EXPECT_NE(finished.err.find("port " + port + " of 127.0.0.1 is in use: give another port"), std::string::npos)
         << finished.err;
@@ -50,7 +50,7 @@ TEST(ViewVerb, ServesThePageUntilItIsStopped) {
        {std::vector<std::string>{"view", recording}, std::vector<std::string>{"view"}}) {
     std::vector<std::string> with_port = args;
     with_port.insert(with_port.end(), {"--port", std::to_string(port)});
-    BackgroundProgram program(with_port, {own_domain()});
+    BackgroundProgram program(with_port, {own_bus()});
     std::string answer;
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (answer.empty() && std::chrono::steady_clock::now() < until) {
@@ -73,7 +73,7 @@ TEST(ViewVerb, RefusesOptionsThatWouldDoNothing) {
                                                {"view", "x.mcap"},
                                                {"view", "--address", "robot"},
                                                {"view", "--token", "a b"}}) {
-    const Finished finished = run_program(args, {own_domain()});
+    const Finished finished = run_program(args, {own_bus()});
     EXPECT_EQ(finished.exit_code, 2) << args.back() << ": " << finished.err;
     EXPECT_FALSE(finished.err.empty());
   }

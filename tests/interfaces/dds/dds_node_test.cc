@@ -2,7 +2,6 @@
 #include "prescene/interfaces/dds/dds_node.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <condition_variable>
@@ -18,6 +17,7 @@
 #include <vector>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "tests/support/bus_domain.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -45,10 +45,9 @@ class Inbox {
   std::vector<ReceivedMessage> messages_;
 };
 
-// Each run in a domain of its own, so that runs beside each other don't hear one another.
 DdsOptions options() {
   DdsOptions options;
-  options.domain = 10 + static_cast<int>(getpid() % 200);
+  options.domain = tests::own_domain();
   return options;
 }
 
@@ -350,7 +349,7 @@ TEST_F(TwoNodes, TopicsOfOthersAreListedWithTheirTypes) {
 
 TEST(DdsNode, SaysWhichInterfaceItUses) {
   DdsOptions asking = options();
-  asking.domain = 10 + (options().domain - 10 + 100) % 200;  // where no node of this process was before
+  asking.domain = tests::another_domain();  // where no node of this process was before
   asking.find_interfaces = true;
   const auto node = DdsNode::create(asking, {});
   ASSERT_TRUE(node.ok()) << node.status().message();

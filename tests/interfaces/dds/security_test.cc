@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "prescene/interfaces/dds/dds_node.h"
+#include "tests/support/bus_domain.h"
 #include "tests/support/paths.h"
 
 namespace prescene::interfaces::security_test {
@@ -25,7 +26,11 @@ using testing::HasSubstr;
 
 constexpr const char* kBelief = "/prescene/belief";
 
-std::string own_domain() { return std::to_string(10 + (getpid() + 50) % 200); }
+/// Not that of the other tests of this program: their nodes know no keys.
+std::string secured_domain() {
+  static const int domain = tests::another_domain();
+  return std::to_string(domain);
+}
 
 /// A security_peer in a process of its own, killed at the end.
 class Peer {
@@ -33,7 +38,7 @@ class Peer {
   Peer(const std::string& folder, const std::string& name, const std::string& does, const std::string& topic) {
     int ends[2];
     EXPECT_EQ(pipe(ends), 0);
-    const std::string domain = own_domain();  // of this process
+    const std::string domain = secured_domain();
     pid_ = fork();
     if (pid_ == 0) {
       dup2(ends[1], STDOUT_FILENO);

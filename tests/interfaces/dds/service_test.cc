@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Services of ROS 2, called by a client that speaks as rmw_cyclonedds_cpp does.
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <string>
@@ -10,6 +9,7 @@
 #include <dds/dds.h>
 #include "prescene/interfaces/dds/dds_node.h"
 #include "tests/interfaces/dds/service_client.h"
+#include "tests/support/bus_domain.h"
 
 // NOLINTBEGIN(readability-identifier-naming): idlc's names
 extern "C" {
@@ -24,11 +24,9 @@ namespace {
 using testing::MatchesRegex;
 using tests::ServiceClient;
 
-int own_domain() { return 10 + static_cast<int>(getpid() % 200); }
-
 std::unique_ptr<DdsNode> node() {
   DdsOptions options;
-  options.domain = own_domain();
+  options.domain = tests::own_domain();
   auto node = DdsNode::create(options, {});
   EXPECT_TRUE(node.ok()) << node.status().message();
   return node ? *std::move(node) : nullptr;
@@ -44,7 +42,7 @@ TEST(Service, RepliesWithTheHeaderOfTheRequestByteByByte) {
                                     EXPECT_TRUE(server->reply(request, true, "here").ok());
                                   })
                   .ok());
-  ServiceClient client(own_domain(), "/robot/where");
+  ServiceClient client(tests::own_domain(), "/robot/where");
   ASSERT_TRUE(client.wait_for_service());
   client.send();
   const std::int64_t sequence = client.send();
@@ -71,8 +69,8 @@ TEST(Service, TakesTextsAndServesClientsApart) {
                                         server->reply(request, request.text.size() < 5, request.text + "!").ok());
                                   })
                   .ok());
-  ServiceClient one(own_domain(), "/robot/ask", true);
-  ServiceClient other(own_domain(), "/robot/ask", true);
+  ServiceClient one(tests::own_domain(), "/robot/ask", true);
+  ServiceClient other(tests::own_domain(), "/robot/ask", true);
   ASSERT_TRUE(one.wait_for_service() && other.wait_for_service());
   ASSERT_NE(one.guid(), other.guid());
   for (int i = 0; i < 20; ++i) {
@@ -99,7 +97,7 @@ TEST(Service, AClientThatHasJustComeGetsItsReply) {
                                   [&](ServiceRequest&& request) { EXPECT_TRUE(server->reply(request, true, "").ok()); })
                   .ok());
   for (int i = 0; i < 20; ++i) {
-    ServiceClient client(own_domain(), "/robot/now");
+    ServiceClient client(tests::own_domain(), "/robot/now");
     ASSERT_TRUE(client.wait_for_service());
     ASSERT_TRUE(client.call().has_value()) << i;
   }
@@ -113,11 +111,11 @@ TEST(Service, AClientThatReadsNoRepliesTakesThemFromNobody) {
                   ->offer_service("/robot/deaf", "std_srvs/srv/Trigger",
                                   [&](ServiceRequest&& request) { EXPECT_TRUE(server->reply(request, true, "").ok()); })
                   .ok());
-  ServiceClient other(own_domain(), "/robot/deaf");
+  ServiceClient other(tests::own_domain(), "/robot/deaf");
   ASSERT_TRUE(other.wait_for_service());
   ASSERT_TRUE(other.call().has_value());
   {
-    ServiceClient deaf(own_domain(), "/robot/deaf");
+    ServiceClient deaf(tests::own_domain(), "/robot/deaf");
     ASSERT_TRUE(deaf.wait_for_service());
     deaf.stop_reading();
     for (int i = 0; i < 50; ++i) {
@@ -135,7 +133,7 @@ TEST(Service, EndpointsSayByTheirUserDataThatTheyBelongTogether) {
     ASSERT_TRUE(server->offer_service(name, "std_srvs/srv/Trigger", [](ServiceRequest&&) {}).ok());
   std::vector<std::string> ids;
   for (const char* name : {"/robot/a", "/robot/b"}) {
-    ServiceClient client(own_domain(), name);
+    ServiceClient client(tests::own_domain(), name);
     ASSERT_TRUE(client.wait_for_service());
     const std::vector<std::string> data = client.user_data();
     ASSERT_EQ(data.size(), 2U);
@@ -151,7 +149,7 @@ TEST(Service, EndpointsSayByTheirUserDataThatTheyBelongTogether) {
 // participant says of itself on ros_discovery_info.
 TEST(Service, TheNodesAnnouncementHoldsItsNameAndTheServicesEndpoints) {
   DdsOptions options;
-  options.domain = own_domain();
+  options.domain = tests::own_domain();
   options.node_name = "announced";
   options.ros_distro = RosDistro::kJazzy;
   const auto server = DdsNode::create(options, {});
@@ -160,12 +158,13 @@ TEST(Service, TheNodesAnnouncementHoldsItsNameAndTheServicesEndpoints) {
       (*server)
           ->offer_service("/announced/list_parameters", "rcl_interfaces/srv/ListParameters", [](ServiceRequest&&) {})
           .ok());
-  ServiceClient client(own_domain(), "/announced/list_parameters", rcl_interfaces_srv_dds__ListParameters_Request__desc,
+  ServiceClient client(tests::own_domain(), "/announced/list_parameters",
+                       rcl_interfaces_srv_dds__ListParameters_Request__desc,
                        rcl_interfaces_srv_dds__ListParameters_Response__desc);
   ASSERT_TRUE(client.wait_for_service());
   const auto guids = client.guids();
   ASSERT_EQ(guids.size(), 2U);
-  const std::vector<std::uint8_t> said = tests::newest_announcement(own_domain(), [&](const auto& bytes) {
+  const std::vector<std::uint8_t> said = tests::newest_announcement(tests::own_domain(), [&](const auto& bytes) {
     return std::all_of(guids.begin(), guids.end(), [&](const auto& guid) {
       return std::search(bytes.begin(), bytes.end(), guid.begin(), guid.end()) != bytes.end();
     });
