@@ -29,7 +29,8 @@ usage: ./dev VERB
   trace-diff A B               name the first difference of two step traces
 
 Presets: dev, release, checked, asan, tsan, coverage. Each verb does what it needs first and says how long it took.
-PRESCENE_JOBS sets the number of parallel jobs (default: the number of processors).
+PRESCENE_JOBS sets the number of parallel jobs (default: the number of processors). With PRESCENE_NO_SKIP=1 a test that would
+be skipped, for want of data for example, fails with its reason.
 END
 }
 
