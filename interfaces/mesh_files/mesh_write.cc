@@ -35,12 +35,17 @@ Vector3d unit_normal(const TriangleMesh& mesh, const std::array<std::uint32_t, 3
 
 }  // namespace
 
-std::string encode_ply(const TriangleMesh& mesh, MeshEncoding encoding, const std::vector<geometry::Rgb>& colors) {
+std::string encode_ply(const TriangleMesh& mesh, MeshEncoding encoding, const std::vector<geometry::Rgb>& colors,
+                       const std::vector<Vector3d>& normals) {
   PRESCENE_CHECK(colors.empty() || colors.size() == mesh.vertices.size());
+  PRESCENE_CHECK(normals.empty() || normals.size() == mesh.vertices.size());
   const bool text = encoding == MeshEncoding::kText;
   std::string out = std::string("ply\nformat ") + (text ? "ascii" : "binary_little_endian") + " 1.0\n";
   out += "element vertex " + std::to_string(mesh.vertices.size()) + "\n";
   for (const char* axis : {"x", "y", "z"}) out += std::string("property double ") + axis + "\n";
+  if (!normals.empty()) {
+    for (const char* axis : {"nx", "ny", "nz"}) out += std::string("property double ") + axis + "\n";
+  }
   if (!colors.empty()) {
     for (const char* channel : {"red", "green", "blue"}) out += std::string("property uchar ") + channel + "\n";
   }
@@ -49,12 +54,16 @@ std::string encode_ply(const TriangleMesh& mesh, MeshEncoding encoding, const st
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     if (text) {
       out += words(mesh.vertices[i]);
+      if (!normals.empty()) out += " " + words(normals[i]);
       if (!colors.empty()) {
         for (const std::uint8_t channel : colors[i]) out += " " + std::to_string(channel);
       }
       out += '\n';
     } else {
       for (const double value : mesh.vertices[i]) append_little_endian(value, &out);
+      if (!normals.empty()) {
+        for (const double value : normals[i]) append_little_endian(value, &out);
+      }
       if (!colors.empty()) out.append(reinterpret_cast<const char*>(colors[i].data()), 3);
     }
   }
@@ -110,8 +119,8 @@ std::string encode_stl(const TriangleMesh& mesh, MeshEncoding encoding) {
 }
 
 Status write_ply(const std::filesystem::path& path, const TriangleMesh& mesh, MeshEncoding encoding,
-                 const std::vector<geometry::Rgb>& colors) {
-  return write_file(path, std::string_view(encode_ply(mesh, encoding, colors)));
+                 const std::vector<geometry::Rgb>& colors, const std::vector<Vector3d>& normals) {
+  return write_file(path, std::string_view(encode_ply(mesh, encoding, colors, normals)));
 }
 
 Status write_obj(const std::filesystem::path& path, const TriangleMesh& mesh) {

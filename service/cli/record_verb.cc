@@ -7,6 +7,7 @@
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/live/bus_recorder.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/recording/bop_dataset.h"
 #include "prescene/service/recording/simulated_recording.h"
 #include "prescene/service/tracking/camera_frames.h"
 #include "verb.h"
@@ -18,6 +19,7 @@ struct RecordOptions {
   std::string output;
   std::string simulate;
   std::string scene;
+  std::string labels;
   std::vector<std::string> removals;
   std::vector<std::string> puts;
   bool unreported_robot = false;
@@ -36,16 +38,19 @@ core::Status with_name(const core::Status& status, const std::filesystem::path& 
   return {status.code(), text};
 }
 
-/// Writes the recording `aside`; kCancelled with what is done in it.
+/// Writes the recording `aside`, and labels where they are asked for; kCancelled with what is done in both.
 core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene& scene, const std::string& text,
-                         FilesOfScene files, const RecordOptions& options, VerbContext& context) {
+                         FilesOfScene files, const RecordOptions& options, Backends& backends, BopDataset* labels,
+                         VerbContext& context) {
   PRESCENE_TRY(const auto recording,
                RecordingWriter::create(aside, {options.simulate, text, context.options().seed, "", std::move(files)}));
-  Backends backends(context.pool());
-  core::Status simulated = simulate_recording(scene, options.simulation, context.options().seed, backends,
+  SimulatedRecordingOptions simulation = options.simulation;
+  if (labels != nullptr) simulation.on_frame = [&](const SimulatedFrame& frame) { return labels->add(frame); };
+  core::Status simulated = simulate_recording(scene, simulation, context.options().seed, backends,
                                               context.cancellation(), context.progress("recording"), *recording);
+  const core::Status labelled = labels != nullptr ? labels->close() : core::ok_status();
   PRESCENE_RETURN_IF_ERROR(recording->close());
-  return simulated;
+  return simulated.ok() ? labelled : simulated;
 }
 
 core::Status record_simulation(RecordOptions& options, VerbContext& context) {
@@ -67,13 +72,23 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   FilesOfScene files;
   PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log(), &files));
   PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *scene));
+  Backends backends(context.pool());
+  PRESCENE_TRY(const auto renderer, backends.make_renderer());
+  std::unique_ptr<BopDataset> labels;
+  if (!options.labels.empty()) {
+    std::error_code none;
+    if (std::filesystem::weakly_canonical(options.labels, none) ==
+        std::filesystem::weakly_canonical(options.output, none))
+      return core::invalid_input("--labels " + options.labels + ": is the recording's name; name a folder");
+    PRESCENE_TRY(labels, BopDataset::create(options.labels, *scene, *renderer));
+  }
   // An older recording of that name stays until this one is whole. Where there is none, what is done is kept.
   std::error_code error;
   const bool replaces = std::filesystem::exists(options.output, error);
   const std::filesystem::path target =
       replaces ? std::filesystem::canonical(options.output, error) : std::filesystem::path(options.output);
   PRESCENE_TRY(const std::filesystem::path aside, interfaces::create_beside(target, options.output));
-  core::Status status = simulate_to(aside, *scene, text, std::move(files), options, context);
+  core::Status status = simulate_to(aside, *scene, text, std::move(files), options, backends, labels.get(), context);
   const bool cancelled = status.code() == core::StatusCode::kCancelled;
   const bool keeps = status.ok() || (cancelled && !replaces);
   if (keeps) std::filesystem::rename(aside, target, error);
@@ -81,8 +96,13 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   if (!keeps || error) std::filesystem::remove(aside, error);
   if (cancelled && replaces) return core::cancelled("stopped on request; " + options.output + " is as it was");
   if (!status.ok()) return with_name(status, aside, options.output);
-  context.print({{"recording", options.output}, {"scene", scene->name}, {"simulated", true}},
-                "recorded " + options.output + "\n");
+  nlohmann::ordered_json document = {{"recording", options.output}, {"scene", scene->name}, {"simulated", true}};
+  std::string said = "recorded " + options.output + "\n";
+  if (labels) {
+    document["labels"] = options.labels;
+    said += "labels are in " + options.labels + "\n";
+  }
+  context.print(document, said);
   return core::ok_status();
 }
 
@@ -139,6 +159,11 @@ Verb add_record_verb(CLI::App& app) {
       ->needs("--simulate");
   verb->add_option("--put", options->puts,
                    "SECONDS:OBJECT:X,Y,Z[,YAW_DEG]: somebody puts the object there (m, its frame's origin), unreported")
+      ->needs("--simulate");
+  verb->add_option("--labels", options->labels,
+                   "New or empty folder for training data: images, masks, poses and models in the layout of the BOP "
+                   "benchmark")
+      ->check(file_name())
       ->needs("--simulate");
   verb->add_flag("--unreported-robot", options->unreported_robot,
                  "The robot moves and acts, but neither its poses nor its actions are published")

@@ -96,7 +96,8 @@ class Player {
 
   /// Of the camera whose turn it is. `scene`: with the objects that are there now, which are the state's.
   core::Status write_frame(std::uint64_t number, const belief::Scene& scene, const belief::WorldState& state) {
-    const Taker& taker = cameras_[number % cameras_.size()];
+    const std::size_t turn = number % cameras_.size();
+    const Taker& taker = cameras_[turn];
     std::vector<geometry::Pose> X_WG;
     for (std::size_t body = 0; body < scene_.robot.size(); ++body) {
       X_WG.push_back(belief::robot_pose_at(scene_, scene_.actions, static_cast<int>(body), state.time));
@@ -137,8 +138,11 @@ class Player {
     }
     PRESCENE_RETURN_IF_ERROR(write(taker.topics.depth, "sensor_msgs/msg/Image", stamp_ns,
                                    interfaces::encode_cdr(interfaces::to_ros_image_16uc1(depth, header))));
-    return recording_.write_json(kTruthTopic, belief::json_text(to_json(truth(scene, state, view, taker, images))),
-                                 stamp_ns + core::ns_of(options_.latency));
+    PRESCENE_RETURN_IF_ERROR(recording_.write_json(kTruthTopic,
+                                                   belief::json_text(to_json(truth(scene, state, view, taker, images))),
+                                                   stamp_ns + core::ns_of(options_.latency)));
+    return options_.on_frame ? options_.on_frame({static_cast<int>(turn), scene, view, images, depth, color})
+                             : core::ok_status();
   }
 
   core::Status write_outcomes(const belief::Trajectory& trajectory) {
@@ -220,6 +224,9 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
     return core::invalid_input("scene '" + scene.name +
                                "' has no camera to record with: add one (docs/reference/scene_files.md)");
   }
+  if (options.on_frame && !options.lens.is_none())
+    return core::invalid_input(
+        "frames with what they show cannot be had through a lens: leave the lens or on_frame out");
   for (int i = 0; i < belief::camera_count(scene); ++i) {
     const belief::SceneCamera& camera = *belief::camera_at(scene, i);
     if (camera.topics && !camera.is_placed)

@@ -4,11 +4,13 @@
 
 #include "prescene/core/log.h"
 #include "prescene/core/progress.h"
+#include "prescene/rendering/renderer.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/recording/frame_history.h"
 #include "prescene/service/recording/recording.h"
 #include "prescene/service/recording/replay_input.h"
+#include "prescene/service/recording/simulated_recording.h"
 #include "prescene/service/recording/tracking_score.h"
 #include "prescene/service/tracking/tracker.h"
 #include "prescene/service/tracking/tracker_settings.h"
@@ -18,6 +20,15 @@ namespace prescene::service::given_service_recording {
 extern const core::LogSink log;
 extern Backends backends;
 extern const TrackerSettings settings;
+
+namespace bop_dataset_h {
+extern const belief::Scene scene;
+extern const std::unique_ptr<rendering::Renderer> renderer;
+extern const std::unique_ptr<RecordingWriter> recording;
+extern const core::Cancellation cancellation;
+extern const core::ProgressSink progress;
+extern SimulatedRecordingOptions options;
+}  // namespace bop_dataset_h
 
 namespace replay_input_h {
 extern const core::Cancellation cancellation;

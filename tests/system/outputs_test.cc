@@ -74,6 +74,20 @@ TEST_F(Outputs, AnOlderRecordingStaysUntilTheNewOneIsWhole) {
   EXPECT_EQ(files(), before);
 }
 
+TEST_F(Outputs, LabelsLieBesideTheSameRecording) {
+  ASSERT_EQ(shell("$P record --simulate seen.yaml -o plain.mcap"), 0);
+  ASSERT_EQ(shell("$P record --simulate seen.yaml -o labelled.mcap --labels labels --json > out"), 0);
+  EXPECT_NE(read_file(path("out")).find(R"("labels")"), std::string::npos) << read_file(path("out"));
+  EXPECT_EQ(shell("cmp plain.mcap labelled.mcap"), 0);
+  EXPECT_EQ(
+      shell("test -s labels/000000/rgb/000000.png -a -s labels/000000/scene_gt.json -a -s labels/models/names.json"),
+      0);
+  // A second run does not mix its labels with those, nor does it touch a recording.
+  EXPECT_EQ(shell("$P record --simulate seen.yaml -o other.mcap --labels labels 2>err"), 2);
+  EXPECT_NE(read_file(path("err")).find("labels: is not empty"), std::string::npos) << read_file(path("err"));
+  EXPECT_EQ(shell("test -e other.mcap"), 1);
+}
+
 TEST_F(Outputs, PipesDevicesAndNamesThatCannotBeAreRefusedBeforeTheWork) {
   ASSERT_EQ(mkfifo(path("pipe").c_str(), 0600), 0);
   std::vector<std::string> places = {path("pipe"), path(std::string(256, 'x'))};
@@ -131,6 +145,10 @@ TEST(CommandLine, OptionsAndVariablesThatMeanNothingHereAreRefused) {
       {{"serve", "--scene", scene}, "ROS_DOMAIN_ID is 'foo'"},
       {{"record", "--simulate", scene, "-o", run, "--domain", "5"}, "--domain is for recording the bus"},
       {{"record", "--simulate", scene, "-o", run, "--interface", "lo"}, "--interface is for recording the bus"},
+      {{"record", "--simulate", scene, "-o", run, "--labels", run}, "is the recording's name"},
+      {{"record", "--simulate", scene, "-o", run, "--labels", scene}, "is no folder"},
+      {{"record", "--simulate", scene, "-o", run, "--labels", folder.path().string()}, "is not empty"},
+      {{"record", "-o", run, "--labels", folder.path().string()}, "--simulate"},
       {{"replay", run, "--domain", "5"}, "--domain is for --over-dds"},
       {{"replay", run, "--peer", "10.0.0.2"}, "--peer is for --over-dds"},
       {{"ask", "where", "--interface", "no such"}, "'no such' is no network interface"},

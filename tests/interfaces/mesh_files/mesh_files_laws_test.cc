@@ -39,11 +39,17 @@ TEST(MeshFileLaws, PlyAndObjGiveTheSameBits) {
     for (auto& color : colors) {
       for (auto& channel : color) channel = static_cast<std::uint8_t>(stream.uniform_below(256));
     }
+    std::vector<geometry::Vector3d> normals(mesh.vertices.size());
+    for (auto& normal : normals) normal = geometry::normal_vector(stream).normalized();
     for (const MeshEncoding encoding : {MeshEncoding::kBinary, MeshEncoding::kText}) {
-      const auto ply = decode_text(MeshFormat::kPly, encode_ply(mesh, encoding, colors));
-      RC_ASSERT(ply.ok());
-      RC_ASSERT(ply->mesh == mesh);
-      RC_ASSERT(ply->colors == colors);
+      for (const bool with_normals : {false, true}) {
+        const auto ply =
+            decode_text(MeshFormat::kPly,
+                        encode_ply(mesh, encoding, colors, with_normals ? normals : std::vector<geometry::Vector3d>()));
+        RC_ASSERT(ply.ok());
+        RC_ASSERT(ply->mesh == mesh);
+        RC_ASSERT(ply->colors == colors);
+      }
     }
     RC_ASSERT(decode_text(MeshFormat::kObj, encode_obj(mesh))->mesh == mesh);
   }));

@@ -73,9 +73,11 @@ std::optional<std::string> scale_hint(const geometry::Box& box, double metres_pe
 
 enum class MeshEncoding { kBinary, kText };
 
-/// PLY with double coordinates (reading gives the same bits) and, if given, one colour a vertex (checked).
+/// PLY with double coordinates (reading gives the same bits) and, if given, one colour and one unit normal a vertex
+/// (counts checked). We read no normals.
 core::Status write_ply(const std::filesystem::path& path, const geometry::TriangleMesh& mesh,
-                       MeshEncoding encoding = MeshEncoding::kBinary, const std::vector<geometry::Rgb>& colors = {});
+                       MeshEncoding encoding = MeshEncoding::kBinary, const std::vector<geometry::Rgb>& colors = {},
+                       const std::vector<geometry::Vector3d>& normals = {});
 /// OBJ; reading gives the same bits.
 core::Status write_obj(const std::filesystem::path& path, const geometry::TriangleMesh& mesh);
 /// STL: coordinates are rounded to float when binary.
@@ -83,7 +85,8 @@ core::Status write_stl(const std::filesystem::path& path, const geometry::Triang
                        MeshEncoding encoding = MeshEncoding::kBinary);
 
 std::string encode_ply(const geometry::TriangleMesh& mesh, MeshEncoding encoding = MeshEncoding::kBinary,
-                       const std::vector<geometry::Rgb>& colors = {});
+                       const std::vector<geometry::Rgb>& colors = {},
+                       const std::vector<geometry::Vector3d>& normals = {});
 std::string encode_obj(const geometry::TriangleMesh& mesh);
 std::string encode_stl(const geometry::TriangleMesh& mesh, MeshEncoding encoding = MeshEncoding::kBinary);
 

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "prescene/belief/trajectory.h"
+#include "prescene/filter/proposals/render_scene.h"
 #include "prescene/geometry/lens.h"
+#include "prescene/rendering/renderer.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/recording/played_scene.h"
@@ -17,6 +19,17 @@
 #include "prescene/service/tracking/topics.h"
 
 namespace prescene::service {
+
+/// A frame as it was recorded, and what it shows. Good for the duration of a call.
+struct SimulatedFrame {
+  int camera = 0;                         ///< camera_at() of the scene.
+  const belief::Scene& scene;             ///< With the objects that are there, in the order of the whole scene.
+  const filter::BeliefView& view;         ///< The true state, as it was rendered.
+  const rendering::RenderedView& images;  ///< Of `view`, without noise.
+  const geometry::DepthImage& depth;      ///< What the camera returned.
+  const geometry::ColorImage& color;
+};
+using SimulatedFrameSink = std::function<core::Status(const SimulatedFrame&)>;
 
 struct SimulatedRecordingOptions {
   double rate = 15.0;                                 ///< Frames a second, of each camera.
@@ -34,6 +47,9 @@ struct SimulatedRecordingOptions {
   std::vector<UnannouncedChange> changes;
   /// Else the poses of robot bodies and the actions are left out: hands that nobody knows of, which act unannounced.
   bool reports_robot = true;
+  /// Called with each frame after it was recorded; what it returns ends the recording where it is not ok. Not through a
+  /// lens: what is rendered is not bent.
+  SimulatedFrameSink on_frame;
 };
 
 /// What the camera frame is called in simulated recordings: as the scene says, else "<camera's name>_optical_frame".
@@ -43,8 +59,8 @@ std::string camera_frame_of(const belief::Scene& scene, int camera = 0);
 /// after everything has come to rest, so that the camera sees the end). Messages: latched camera pose, robot poses,
 /// camera info, depth (16UC1, millimetres) and colour (rgb8), the scene's actions as controls at their times, the truth
 /// of each frame, and in the end which of the scene's outcomes occurred. Several cameras take turns: they are not
-/// triggered together. Fails with kInvalidInput when the scene has no camera, or one of several has no pose, or a
-/// change is none (play_scene), kCancelled with what is done kept.
+/// triggered together. Fails with kInvalidInput when the scene has no camera, or one of several has no pose, a change
+/// is none (play_scene), or frames are asked for (on_frame) through a lens; kCancelled with what is done kept.
 core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecordingOptions& options,
                                 std::uint64_t seed, Backends& backends, const core::Cancellation& cancellation,
                                 const core::ProgressSink& progress, RecordingWriter& recording);
