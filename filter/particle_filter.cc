@@ -163,7 +163,8 @@ void ParticleFilter::follow_supports(const belief::Observation& observation, Ste
   const bool first = belief.step == 1;
   const bool searches = first && std::any_of(belief.scene->objects.begin(), belief.scene->objects.end(),
                                              [](const auto& o) { return has_wide_prior(o); });
-  const bool has_none = belief.scene->supports.empty() && (first || belief.step % kLookForSupport == 0);
+  const bool has_none =
+      belief.scene->supports.empty() && (first || frames_of(belief, observation.camera) % kLookForSupport == 0);
   if (settings_.initialise.add_support && (has_none || searches)) {
     const core::RandomStream stream(belief.seed, core::Purpose::kDetection, 1);
     const std::vector<belief::Support> found =

@@ -17,7 +17,7 @@ _prescene() {
   elif [[ -z $verb ]]; then
     words=$(awk '/^Subcommands:/ {listed = 1; next} listed && /^  [a-z]/ {print $1}' <<< "$help")
   elif [[ $before == "$verb" ]]; then
-    words=$(sed -nE 's/^ +[a-z][a-z_-]* [A-Z]*:?\{([^}]*)\}.*/\1/p' <<< "$help" | tr ',' '\n')
+    words=$(sed -nE 's/^ +[A-Za-z][A-Za-z_-]* [A-Z]*:?\(?\{([^}]*)\}.*/\1/p' <<< "$help" | tr ',' '\n')
   fi
   # Where there is nothing to choose from, bash completes the names of files.
   mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current")

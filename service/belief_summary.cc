@@ -252,7 +252,7 @@ interfaces::RosTfMessage transforms_of(const BeliefSummary& summary, const std::
   for (const ObjectSummary& object : summary.objects) {
     if (object.state == belief::TrackState::kLost) continue;
     message.transforms.push_back(interfaces::to_ros_transform(
-        interfaces::FrameTransform{world_frame, "prescene/" + object.name, summary.stamp_ns, object.X_WO}));
+        interfaces::FrameTransform{world_frame, kFramePrefix + object.name, summary.stamp_ns, object.X_WO}));
   }
   return message;
 }

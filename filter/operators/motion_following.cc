@@ -161,6 +161,7 @@ void follow_motion(const belief::Belief& belief, int object, MotionRecord& recor
   MotionSample now = sample_of(belief, estimate);
   if (let_go && !judging) {
     begin_anew(now.X_WO, record);
+    keep_recent(now, record);
     record.episode.emplace();
     record.episode->kind = EpisodeKind::kRelease;
     record.episode->samples = {now};

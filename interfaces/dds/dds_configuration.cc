@@ -8,6 +8,7 @@
 #include <cctype>
 #include <cstddef>
 #include <cstdlib>
+#include <vector>
 
 namespace prescene::interfaces {
 namespace {
@@ -43,12 +44,20 @@ std::string interfaces_xml(const DdsOptions& options) {
   return xml + "</Interfaces>";
 }
 
+/// On the loopback interface others may have switched multicast off: they are looked for at their ports, too.
 std::string discovery_xml(const DdsOptions& options) {
-  if (options.peers.empty()) return "";
+  std::vector<std::string> peers = options.peers;
+  if (std::any_of(options.interfaces.begin(), options.interfaces.end(), is_loopback)) peers.emplace_back("127.0.0.1");
+  if (peers.empty()) return "";
   std::string xml = "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>" +
                     std::to_string(kMostParticipants - 1) + "</MaxAutoParticipantIndex><Peers>";
-  for (const std::string& address : options.peers) xml += "<Peer address=\"" + address + "\"/>";
+  for (const std::string& address : peers) xml += "<Peer address=\"" + address + "\"/>";
   return xml + "</Peers></Discovery>";
+}
+
+std::string uri() {
+  const char* variable = std::getenv("CYCLONEDDS_URI");
+  return variable ? variable : "";
 }
 
 }  // namespace
@@ -61,6 +70,10 @@ core::Status check_network(const DdsOptions& options) {
   for (const std::string& address : options.peers)
     if (!is_network_name(address))
       return core::invalid_input("'" + address + "' is no peer: give the address or the name of a machine");
+  // Interfaces of several places add up, and one that is named twice ends in an error that names none.
+  if (!options.interfaces.empty() && uri().find("NetworkInterface") != std::string::npos)
+    return core::invalid_input(
+        "the environment's CYCLONEDDS_URI names network interfaces, and --interface does: leave them out in one place");
   return core::ok_status();
 }
 
@@ -72,7 +85,7 @@ std::string configuration_of(const DdsOptions& options) {
                     std::to_string(2 * options.max_message_bytes) + "B</MaxSampleSize></Internal>";
   if (options.find_interfaces)
     xml += "<Tracing><Category>config</Category><OutputFile>/dev/null</OutputFile></Tracing>";
-  if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri && *uri) xml += std::string(",") + uri;
+  if (const std::string users = uri(); !users.empty()) xml += "," + users;
   return xml;
 }
 

@@ -185,6 +185,7 @@ Verb add_ask_verb(CLI::App& app) {
                    "where: poses and confidence; relations: what is on, in, held by what; timeline: what was when; "
                    "explain: what happened in the last seconds; stability: does it stay; release: what if it is let "
                    "go; achieve: how must it be done")
+      ->type_name("TEXT:{where,relations,timeline,explain,stability,release,achieve}")
       ->check(utf8_text());
   verb->add_option("OBJECT", options->object, "The object's name in the scene; of achieve, the outcome's")
       ->check(utf8_text());

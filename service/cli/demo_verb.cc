@@ -33,7 +33,7 @@ namespace {
 using core::fixed_text;
 using Arguments = std::vector<std::string>;
 
-constexpr const char* kThisMachine = "lo";  // keeps the demo out of the robot's way
+constexpr const char* kThisMachine = "lo";                  // keeps the demo out of the robot's way
 constexpr std::size_t kMostPrinted = std::size_t{1} << 20;  // bytes of an answer
 
 struct DemoOptions {
@@ -180,7 +180,7 @@ class Demo {
   /// As step(); what the verb printed, which goes where it would have gone when it has ended.
   core::Result<std::string> answered(const std::string& text, const Arguments& arguments) {
     title(text);
-    const std::string file = path(arguments[0] + ".txt");
+    const std::string file = path(".printed_by_" + arguments[0]);
     PRESCENE_TRY(RunningVerb running, RunningVerb::start(with_common(arguments), context_.options().json, file));
     const core::Status ended = running.wait(context_.cancellation());
     const auto bytes = interfaces::read_file(file, kMostPrinted);
@@ -225,6 +225,7 @@ core::Status run(const DemoOptions& options, VerbContext& context) {
   // A domain of its own keeps the demo out of that of a demo beside it.
   if (::setenv("ROS_DOMAIN_ID", std::to_string(100 + ::getpid() % 100).c_str(), 1) != 0)
     return core::unavailable("the environment cannot be changed");
+  ::unsetenv("CYCLONEDDS_URI");  // how the robot's bus is set up is nothing to the demo
   Demo demo(options.folder, context);
   PRESCENE_RETURN_IF_ERROR(interfaces::write_file(demo.path("milk_on_bin.yaml"), demo_scene()));
   PRESCENE_TRY(const auto scene, load_scene(demo.path("milk_on_bin.yaml"), context.log()));

@@ -85,18 +85,6 @@ core::Status evaluate_folder(const EvaluateFolderOptions& options, VerbContext& 
   }
   context.end_progress();
   if (!found) return found.status();
-  if (!options.report.empty()) {
-    interfaces::ReportContents contents;
-    contents.title = options.folder;
-    contents.subtitle = "Forecasts of recorded tosses against how they ended";
-    const std::string model = options.folds ? "fitted to the others, " + std::to_string(*options.folds) + " parts"
-                              : options.model.empty() ? std::string("the scene's own")
-                                                      : options.model;
-    contents.facts = {{"folder", options.folder}, {"model", model}, {"seed", std::to_string(context.options().seed)}};
-    contents.sections = evaluation_sections(*found);
-    PRESCENE_RETURN_IF_ERROR(interfaces::write_report(options.report, contents));
-    core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
-  }
   nlohmann::ordered_json document;
   document["folder"] = options.folder;
   document["model"] = options.model;
@@ -109,6 +97,18 @@ core::Status evaluate_folder(const EvaluateFolderOptions& options, VerbContext& 
   if (!found->remarks.empty()) text += "\n";
   for (const std::string& remark : found->remarks) text += remark + "\n";
   context.print(document, text);
+  if (!options.report.empty()) {
+    interfaces::ReportContents contents;
+    contents.title = options.folder;
+    contents.subtitle = "Forecasts of recorded tosses against how they ended";
+    const std::string model = options.folds ? "fitted to the others, " + std::to_string(*options.folds) + " parts"
+                              : options.model.empty() ? std::string("the scene's own")
+                                                      : options.model;
+    contents.facts = {{"folder", options.folder}, {"model", model}, {"seed", std::to_string(context.options().seed)}};
+    contents.sections = evaluation_sections(*found);
+    PRESCENE_RETURN_IF_ERROR(interfaces::write_report(options.report, contents));
+    core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
+  }
   return core::ok_status();
 }
 

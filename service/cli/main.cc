@@ -23,12 +23,15 @@ namespace {
 
 prescene::core::Cancellation cancellation;
 
-// The first Ctrl-C, or end of the terminal, asks the work to stop and keep what is done; a second one ends the program
+// The first Ctrl-C asks the work to stop and keep what is done; a second one ends the program
 // at once.
 extern "C" void on_interrupt(int signal_number) {
   cancellation.request();
   std::signal(signal_number, SIG_DFL);
 }
+
+// Where a terminal ends, its shell says so, and the kernel does once more: neither is a second wish.
+extern "C" void on_hangup(int) { cancellation.request(); }
 
 /// A file that is opened later would become standard output or error where that is closed, and what is printed would
 /// go into it.
@@ -43,8 +46,8 @@ void open_standard_streams() {
 void handle_signals() {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
-  // Where the terminal goes; nohup has it ignored, and so it stays.
-  if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+  // nohup has it ignored, and so it stays.
+  if (std::signal(SIGHUP, on_hangup) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // Writing beyond the limit is then an error like that of a full disk.
   std::signal(SIGCHLD, SIG_DFL);  // Whoever started us may ignore it, and no child's exit code could be had.

@@ -56,6 +56,7 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
       // Never back, so that the order by time is the order of arrival.
       message.received_ns = last_ns = std::max(last_ns, message.received_ns);
       std::erase_if(waits_for, [&](const CameraInput& camera) { return camera.topics.depth == message.topic; });
+      if (are_of_objects(message)) continue;  // what a service made of all the rest
       ++messages;
       try {
         recording.write(message);

@@ -179,7 +179,7 @@ core::Status validate(const BusReplayOptions& options) {
 bool is_robots(const RecordedEntry& entry) {
   const std::string& topic = entry.message.topic;
   return !entry.is_json && topic != kQueryTopic && topic != kAnswerTopic && topic != kSettingsTopic &&
-         entry.message.type != "rcl_interfaces/msg/ParameterEvent";
+         entry.message.type != "rcl_interfaces/msg/ParameterEvent" && !are_of_objects(entry.message);
 }
 
 /// The publisher of a topic; none of a type that no service of ours reads, as bags of robots have many.

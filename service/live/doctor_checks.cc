@@ -24,7 +24,7 @@ void check_domain(const BusSurroundings& around, Checks& checks) {
     checks.fail(
         "domain", "nobody else is in " + domain,
         "start the robot's nodes; give the same domain on both sides (--domain, ROS_DOMAIN_ID); across machines, "
-        "let multicast through or name peers in CYCLONEDDS_URI");
+        "let multicast through or name the other machine (--peer)");
   } else {
     checks.ok("domain",
               domain + ", " + counted_text(static_cast<std::size_t>(around.participants), "other participant"));
@@ -37,15 +37,13 @@ void check_domain(const BusSurroundings& around, Checks& checks) {
                     ", so nodes of ROS that are started in it keep to this machine's loopback interface, while "
                     "Prescene uses " +
                     (around.interfaces.empty() ? "another" : around.interfaces),
-                "unset " + variable +
-                    ", or give Prescene the same interface: CYCLONEDDS_URI='<General><Interfaces>"
-                    "<NetworkInterface name=\"lo\"/></Interfaces></General>'");
+                "unset " + variable + ", or give Prescene the same interface: --interface lo");
     return;
   }
   if (around.interfaces.empty()) return;
   if (around.interfaces.starts_with("lo "))
     checks.warn(name, around.interfaces + ": only nodes on this machine are found",
-                "if the camera is on another machine, connect the network, or name its interface in CYCLONEDDS_URI");
+                "if the camera is on another machine, connect the network, or name its interface (--interface)");
   else
     checks.ok(name, around.interfaces);
 }

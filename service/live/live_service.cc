@@ -108,10 +108,10 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   hooks.restart = [raw] { raw->put_text(kControlTopic, R"({"restart": true})"); };
   hooks.keeps_learned = impl->learned_file != nullptr;
   impl->calls = std::make_unique<ServiceCalls>(*impl->node, std::move(hooks), impl->log);
-  PRESCENE_TRY(impl->progress, impl->node->advertise(kProgressTopic, "std_msgs/msg/String", TopicQos::kState));
-  impl->settings.worker.on_progress = [raw](const std::string& progress) {
-    raw->check_sent(raw->node->publish(raw->progress, interfaces::RosString{progress}));
-  };
+  if (const auto progress = impl->advertised_if_allowed(kProgressTopic, "std_msgs/msg/String", ""))
+    impl->settings.worker.on_progress = [raw, topic = *progress](const std::string& text) {
+      raw->check_sent(raw->node->publish(topic, interfaces::RosString{text}));
+    };
   impl->history = std::make_unique<HistoryKeeper>(backends, settings.history);
   impl->settings.worker.timeline = [raw] { return raw->history->timeline(); };
   impl->settings.worker.explain = [raw](const belief::ExplainQuestion& question, const queries::QueryContext& context) {
@@ -154,15 +154,26 @@ ParameterHooks LiveService::Impl::parameter_hooks() {
   return hooks;
 }
 
+std::optional<interfaces::DdsPublisher> LiveService::Impl::advertised_if_allowed(const std::string& topic,
+                                                                                 const std::string& type,
+                                                                                 const std::string& remedy) {
+  auto publisher = node->advertise(topic, type, TopicQos::kState);
+  if (publisher) return *publisher;
+  core::log(log, core::LogLevel::kWarning,
+            topic + " is not published: " + publisher.status().message() +
+                (remedy.empty() ? ": " : ": " + remedy + " ") +
+                "with --security make keys that allow it (docs/reference/security.md)");
+  return std::nullopt;
+}
+
 core::Status LiveService::Impl::join_bus() {
   PRESCENE_TRY(beliefs, node->advertise(kBeliefTopic, "std_msgs/msg/String", TopicQos::kState));
   PRESCENE_TRY(detections, node->advertise(kDetectionsTopic, kDetectionsType, TopicQos::kState));
   PRESCENE_TRY(markers, node->advertise(kMarkersTopic, kMarkersType, TopicQos::kState));
   PRESCENE_TRY(diagnostics,
                node->advertise(kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray", TopicQos::kState));
-  if (settings.publish_tf) {
-    PRESCENE_TRY(transforms, node->advertise(settings.tracker.topics.tf, kTransformsType, TopicQos::kState));
-  }
+  if (settings.publish_tf)
+    transforms = advertised_if_allowed(settings.tracker.topics.tf, kTransformsType, "give --no-tf, or");
   for (const belief::SceneObject& object : scene->objects) {
     PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name), kPoseType, TopicQos::kState));
   }
@@ -341,6 +352,7 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
                   topics_text(camera.topics));
   bool stepped = false;
   const auto turn = [&] {
+    impl.manager.note_turn();
     auto until = steady_clock::now() + kPollInterval;
     if (std::exchange(stepped, false) && impl.cameras.size() > 1) {
       until = steady_clock::now();
@@ -350,7 +362,6 @@ core::Status LiveService::run(const core::Cancellation& cancellation) {
     }
     impl.take_in(impl.inbox.take_all(until), cancellation);
     stepped = impl.look_after_frames();
-    impl.manager.note_turn();
   };
   while (!cancellation.requested()) {
     try {

@@ -90,6 +90,9 @@ struct LiveService::Impl {
   void look_after_saves();
   /// What a service was called with, as if it had come on a topic: taken in and recorded.
   void put_text(const char* topic, const std::string& text);
+  /// Of what the service can do without: nothing, and a warning, where it may not be written.
+  std::optional<interfaces::DdsPublisher> advertised_if_allowed(const std::string& topic, const std::string& type,
+                                                                const std::string& remedy);
   /// Steps the belief if a frame is complete, records what was answered, publishes. Whether it made a step: another
   /// camera's frame may be complete already.
   bool look_after_frames();
@@ -123,7 +126,7 @@ struct LiveService::Impl {
   FrameHistory frames;  // for questions what happened
   RateLimit learned_limit;
 
-  interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers, progress;
+  interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers;
   std::optional<interfaces::DdsPublisher> transforms;
   std::map<std::string, interfaces::DdsPublisher> poses;
   MessageIndex next_index = 0;

@@ -42,16 +42,16 @@ const std::string& id_in(const Question& question) {
   return std::visit([](const auto& one) -> const std::string& { return one.id; }, question);
 }
 
-/// The id in {"cancel": ID}; nothing where the text is no such request.
-std::optional<core::Result<std::string>> id_to_cancel(const std::string& text) {
+/// Nothing where the text is no request to cancel.
+std::optional<core::Result<CancelRequest>> cancel_request(const std::string& text) {
   // Looked for first, as all but a few texts are questions and need not be parsed twice.
   if (text.find("\"cancel\"") == std::string::npos) return std::nullopt;
   const auto document = belief::parse_json(text, kLongestWithId);
   if (!document || !document->is_object() || !document->contains("cancel")) return std::nullopt;
-  const auto& id = document->at("cancel");
-  if (document->size() == 1 && id.is_string() && !id.get_ref<const std::string&>().empty())
-    return id.get<std::string>();
-  return core::invalid_input("cancel: give the id of a question, and nothing else: {\"cancel\": \"7\"}");
+  const auto& question = document->at("cancel");
+  CancelRequest request{question.is_string() ? question.get<std::string>() : "", id_of(text)};
+  if (!request.question.empty() && document->size() == (document->contains("id") ? 2U : 1U)) return request;
+  return core::invalid_input("cancel: give the id of a question: {\"cancel\": \"7\"}");
 }
 
 core::Status too_many_wait(std::size_t count) {
@@ -185,9 +185,9 @@ void QueryWorker::read(const std::string& question_json) {
     if (question_json.size() > kLongestQuestion)
       return refuse("", core::resource_exhausted("the question is longer than " + std::to_string(kLongestQuestion) +
                                                  " bytes: make it shorter"));
-    if (const auto cancelled = id_to_cancel(question_json)) {
-      if (!*cancelled) return refuse("", cancelled->status());
-      return cancel(**cancelled);
+    if (const auto request = cancel_request(question_json)) {
+      if (!*request) return refuse(id_of(question_json), request->status());
+      return cancel(**request);
     }
     std::shared_ptr<const Question> question;
     if (belief::asks_to_explain(question_json)) {
@@ -207,18 +207,19 @@ void QueryWorker::read(const std::string& question_json) {
     core::Status reason;
     {
       const std::lock_guard lock(mutex_);
-      const auto has_id = [&id](const auto& other) { return other && id_in(*other) == id; };
+      const auto has_id = [&id](const Work& other) { return other.question && id_in(*other.question) == id; };
       const auto same_id = std::find_if(waiting_.begin(), waiting_.end(), has_id);
-      const auto& other = same_id != waiting_.end() ? *same_id : in_work_;
+      const Work& other = same_id != waiting_.end() ? *same_id : in_work_;
       if (!id.empty() && has_id(other)) {
-        if (*other == *question) {
+        if (*other.question == *question) {
           ++counts_.repeated;
           return;
         }
         reason = core::invalid_input("another question with the id '" + id +
                                      "' is not answered yet: choose another id, one that no other client uses");
       } else if (waiting_.size() < settings_.max_waiting) {
-        waiting_.push_back(question);
+        waiting_.push_back(
+            {question, std::make_shared<core::Cancellation>(stop_, core::Cancellation::Clock::time_point::max())});
         simulate_changed_.notify_one();
         return;
       } else {
@@ -231,40 +232,37 @@ void QueryWorker::read(const std::string& question_json) {
   }
 }
 
-void QueryWorker::cancel(const std::string& id) {
-  bool waited = false;
+void QueryWorker::cancel(const CancelRequest& request) {
+  bool waited = false, worked_on = false;
   {
     const std::lock_guard lock(mutex_);
     ++counts_.cancels;
-    if (in_work_ && id_in(*in_work_) == id) {
-      end_of_work_->request();  // its answer says the rest
-      return;
-    }
-    waited = std::erase_if(waiting_, [&id](const auto& question) { return id_in(*question) == id; }) > 0;
+    worked_on = in_work_.question && id_in(*in_work_.question) == request.question;
+    if (worked_on) in_work_.end->request();  // its answer says the rest
+    waited = std::erase_if(waiting_, [&](const Work& work) { return id_in(*work.question) == request.question; }) > 0;
   }
-  if (waited)
-    refuse(id, core::cancelled("cancelled before it was begun"));
-  else
-    send(
-        error_answer(id, core::not_found("no question with this id waits or is worked on: it may be answered already")),
-        nullptr);
+  if (waited) refuse(request.question, core::cancelled("cancelled before it was begun"));
+  if (request.id.empty()) return;
+  send(waited || worked_on
+           ? belief::json_text({{"id", request.id}, {"cancelled", request.question}})
+           : error_answer(request.id, core::not_found("no question with the id '" + request.question +
+                                                      "' waits or is worked on: it may be answered already")),
+       nullptr);
 }
 
 void QueryWorker::simulate_questions() {
   core::lower_thread_priority();
   for (;;) {
-    std::shared_ptr<const Question> question;
-    std::shared_ptr<core::Cancellation> end;
+    Work work;
     {
       std::unique_lock lock(mutex_);
       simulate_changed_.wait(lock, [&] { return stop_.requested() || !waiting_.empty(); });
       if (stop_.requested()) return;
-      question = std::move(waiting_.front());
+      work = std::move(waiting_.front());
       waiting_.pop_front();
-      in_work_ = question;
-      end = end_of_work_ = std::make_shared<core::Cancellation>(stop_, core::Cancellation::Clock::time_point::max());
+      in_work_ = work;
     }
-    answer(*question, *end);
+    answer(*work.question, *work.end);
   }
 }
 
@@ -273,7 +271,7 @@ void QueryWorker::answer(const Question& question, const core::Cancellation& can
   const auto finish = [&] {
     // Before the answer goes out: whoever has it may ask under the same id again.
     const std::lock_guard lock(mutex_);
-    if (in_work_.get() == &question) in_work_.reset();
+    if (in_work_.question.get() == &question) in_work_ = {};
   };
   try {
     const Reply reply = reply_to(question, cancelled);

@@ -77,12 +77,13 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
                                  waiting->second.answer = text->data;
                                  raw->changed_.notify_all();
                                }));
-  PRESCENE_RETURN_IF_ERROR(
-      client->node_->subscribe(kProgressTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable,
-                               [raw](interfaces::ReceivedMessage&& message) {
-                                 const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
-                                 if (text) raw->note_progress(parse_or_discard(text->data));
-                               }));
+  // Whoever may not read it does without.
+  static_cast<void>(client->node_->subscribe(kProgressTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable,
+                                             [raw](interfaces::ReceivedMessage&& message) {
+                                               const auto text =
+                                                   interfaces::decode_cdr<interfaces::RosString>(message.cdr);
+                                               if (text) raw->note_progress(parse_or_discard(text->data));
+                                             }));
   PRESCENE_TRY(client->queries_,
                client->node_->advertise(kQueryTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable));
   return client;
@@ -99,9 +100,15 @@ void QuestionClient::note_progress(const nlohmann::ordered_json& said) {
   at.fraction = said["fraction"].get<double>();
   if (is("text", &nlohmann::ordered_json::is_string)) at.text = said["text"].get<std::string>();
   if (is("seconds_left", &nlohmann::ordered_json::is_number)) at.seconds_left = said["seconds_left"].get<double>();
-  const std::lock_guard lock(mutex_);
-  const auto waiting = answers_.find(said["id"].get<std::string>());
-  if (waiting != answers_.end() && waiting->second.progress) waiting->second.progress(at);
+  std::shared_ptr<Told> told;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto waiting = answers_.find(said["id"].get<std::string>());
+    if (waiting == answers_.end()) return;
+    told = waiting->second.told;
+  }
+  const std::lock_guard lock(told->mutex);
+  if (told->progress) told->progress(at);
 }
 
 core::Status QuestionClient::cancel(const std::string& id) {
@@ -112,11 +119,16 @@ core::Status QuestionClient::cancel(const std::string& id) {
 class QuestionClient::Waiting {
  public:
   Waiting(QuestionClient& client, std::string id, const core::ProgressSink& progress)
-      : client_(client), id_(std::move(id)) {
+      : client_(client), id_(std::move(id)), told_(std::make_shared<Told>()) {
+    told_->progress = progress;
     const std::lock_guard lock(client_.mutex_);
-    is_first_ = client_.answers_.try_emplace(id_, Waited{{}, progress}).second;
+    is_first_ = client_.answers_.try_emplace(id_, Waited{{}, told_}).second;
   }
   ~Waiting() {
+    {
+      const std::lock_guard lock(told_->mutex);
+      told_->progress = {};  // what it refers to may end with this
+    }
     if (!is_first_) return;
     const std::lock_guard lock(client_.mutex_);
     client_.answers_.erase(id_);
@@ -137,6 +149,7 @@ class QuestionClient::Waiting {
  private:
   QuestionClient& client_;
   std::string id_;
+  std::shared_ptr<Told> told_;
   bool is_first_ = false;
 };
 
@@ -156,11 +169,11 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
       steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(std::chrono::duration<double>(timeout));
   auto ask_at = steady_clock::now();
   bool found_service = false;
-  bool was_busy = false;
+  bool was_busy = false, was_sent = false;
   core::Status sent;  // of the last try
   while (steady_clock::now() < deadline) {
     if (cancellation.requested()) {
-      if (found_service) static_cast<void>(cancel(id));  // what can't be told costs the service some seconds
+      if (was_sent) static_cast<void>(cancel(id));  // what can't be told costs the service some seconds
       return core::cancelled("stopped on request");
     }
     // Both ways must be open, or the answer would be lost.
@@ -168,6 +181,7 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
     found_service = found_service || there;
     if (there && steady_clock::now() >= ask_at) {
       sent = node_->publish(queries_, interfaces::RosString{belief::json_text(question)});
+      was_sent = was_sent || sent.ok();
       if (sent.ok()) ask_at = steady_clock::now() + kAskAgain;  // else at once: what holds it up may pass
     }
     std::optional<std::string> answer = waiting.answer_within(kAskInterval);
@@ -176,8 +190,8 @@ core::Result<std::string> QuestionClient::ask(const std::string& question_json, 
     was_busy = true;
     ask_at = steady_clock::now() + kBusyPause;
   }
+  if (was_sent) static_cast<void>(cancel(id));
   if (!sent.ok()) return sent;
-  if (found_service) static_cast<void>(cancel(id));
   const std::string waited = " within " + core::rounded_text(timeout) + " s";
   if (was_busy)
     return core::unavailable("the service had too many questions waiting" + waited + ": ask fewer at a time");

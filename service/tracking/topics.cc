@@ -8,6 +8,7 @@
 
 #include "prescene/core/utf8.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/belief_summary.h"
 
 namespace prescene::service {
 namespace {
@@ -65,6 +66,14 @@ core::Status validate(const InputTopics& topics) {
   if (!known(topics.depth_form, true) || !known(topics.color_form, false))
     return core::invalid_input("the form of an image topic is image or compressed, of the depth topic also points");
   return core::ok_status();
+}
+
+bool are_of_objects(const interfaces::ReceivedMessage& message) {
+  if (message.type != "tf2_msgs/msg/TFMessage") return false;
+  const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr, interfaces::kSmallMessage);
+  return tf && !tf->transforms.empty() &&
+         std::all_of(tf->transforms.begin(), tf->transforms.end(),
+                     [](const auto& transform) { return transform.child_frame_id.starts_with(kFramePrefix); });
 }
 
 std::string pose_topic(const std::string& object) {

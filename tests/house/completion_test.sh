@@ -32,7 +32,7 @@ for verb in $verbs; do
   offers --json "$verb" --
   offers --seed "$verb" --se
   for option in $(after "$verb" --); do
-    "$program" "$verb" --help | grep -qE -- "(^|[ ,])$option( |,|\$)" || fail "$verb has no option $option"
+    "$program" "$verb" --help | grep -qE -- "(^|[ ,])$option( |,|\{|\$)" || fail "$verb has no option $option"
   done
 done
 offers lockstep predict --stepper ''

@@ -230,14 +230,15 @@ TEST(MeshInspection, ASimplifiedHullIsTheOneThatIsSimulated) {
   const auto path = folder.path() / "thing.ply";
   const geometry::TriangleMesh can = geometry::make_mesh(geometry::Cylinder{0.03, 0.1}, 48);
   // Small things are simulated as similar ones of household size; a box is its hull.
-  for (const auto& mesh : {fine_ball(0.05, 1000), fine_ball(0.004, 1000), can,
-                           geometry::make_mesh(geometry::BoxShape{Vector3d(0.05, 0.1, 0.2)})}) {
+  const geometry::TriangleMesh box = geometry::make_mesh(geometry::BoxShape{Vector3d(0.05, 0.1, 0.2)});
+  for (const auto& [mesh, mass] : {std::pair(fine_ball(0.05, 1000), "0.5"), std::pair(fine_ball(0.004, 1000), "0.0003"),
+                                   std::pair(can, "0.3"), std::pair(box, "1")}) {
     ASSERT_TRUE(interfaces::write_ply(path, mesh).ok());
     const auto found = inspect_mesh(path, {});
     ASSERT_TRUE(found.ok() && found->lockstep_hull) << found.status().message();
     const auto scene = load_scene_text(
-        "models: {m: {mesh: {file: thing.ply, use: convex_hull}, mass: 0.1}}\n"
-        "supports: {floor: {ground: {size: 4}}}\nobjects: {m: {model: m, pose: {position: [0, 0, 1]}}}\n",
+        "models: {m: {mesh: {file: thing.ply, use: convex_hull}, mass: " + std::string(mass) + "}}\n" +
+            "supports: {floor: {ground: {size: 4}}}\nobjects: {m: {model: m, pose: {position: [0, 0, 1]}}}\n",
         folder.path() / "scene.yaml", {});
     ASSERT_TRUE(scene.ok()) << scene.status().message();
     const double error = found->lockstep_hull->error;

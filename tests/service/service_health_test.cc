@@ -60,7 +60,7 @@ TEST(ServiceHealth, CarriesItsCounts) {
   health.lost_on_bus = 7;
   health.waiting_controls = 23;
   health.dropped_controls = 29;
-  health.questions = {11, 13, 17, 19, 2, "no", 5};
+  health.questions = {11, 13, 17, 19, 31, 2, "no", 5};
   health.unreadable_questions = 1;
   health.failures = 4;
   health.not_simulated = 111;

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+
 namespace prescene::service::topics_test {
 namespace {
 
@@ -77,6 +80,25 @@ TEST(BusTopics, ARenamedTopicIsOfferedByItsType) {
   EXPECT_EQ(offered_as("/robot/tf_static", "tf2_msgs/msg/TFMessage"), TopicQos::kLatched);
   EXPECT_EQ(offered_as("/robot/tf", "tf2_msgs/msg/TFMessage"), TopicQos::kTf);
   EXPECT_EQ(offered_as("/tf_static", "tf2_msgs/msg/TFMessage"), TopicQos::kLatched);
+}
+
+TEST(Topics, TransformsOfObjectsAreNotTheRobots) {
+  const auto message = [](const std::vector<std::string>& frames, const std::string& type = "tf2_msgs/msg/TFMessage") {
+    interfaces::RosTfMessage tf;
+    for (const std::string& frame : frames) {
+      interfaces::FrameTransform transform{"map", frame, 5, geometry::Pose::identity()};
+      tf.transforms.push_back(interfaces::to_ros_transform(transform));
+    }
+    return interfaces::ReceivedMessage{"/tf", type, interfaces::encode_cdr(tf), 5, 5};
+  };
+  EXPECT_TRUE(are_of_objects(message({"prescene/mug", "prescene/box"})));
+  EXPECT_FALSE(are_of_objects(message({"prescene/mug", "hand"})));
+  EXPECT_FALSE(are_of_objects(message({"prescene_camera"})));
+  EXPECT_FALSE(are_of_objects(message({})));
+  EXPECT_FALSE(are_of_objects(message({"prescene/mug"}, "std_msgs/msg/String")));
+  interfaces::ReceivedMessage cut = message({"prescene/mug"});
+  cut.cdr.resize(cut.cdr.size() / 2);
+  EXPECT_FALSE(are_of_objects(cut));
 }
 
 }  // namespace

@@ -59,6 +59,7 @@ TEST_F(BusFaults, TheEndOfATerminalClosesTheRecording) {
   const auto service = serve({"--record", file});
   std::signal(SIGHUP, before);
   ASSERT_TRUE(tracks(*service)) << log();
+  service->signal(SIGHUP);  // of the shell that ends, and then of the kernel
   EXPECT_EQ(service->stop(SIGHUP), 0) << log();
   EXPECT_EQ(read_back(file).loss, "");
 }

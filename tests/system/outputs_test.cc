@@ -151,7 +151,7 @@ TEST(CommandLine, OptionsAndVariablesThatMeanNothingHereAreRefused) {
       {{"record", "-o", run, "--labels", folder.path().string()}, "--simulate"},
       {{"replay", run, "--domain", "5"}, "--domain is for --over-dds"},
       {{"replay", run, "--peer", "10.0.0.2"}, "--peer is for --over-dds"},
-      {{"ask", "where", "--interface", "no such"}, "'no such' is no network interface"},
+      {{"ask", "where", "--domain", "5", "--interface", "no such"}, "'no such' is no network interface"},
       {{"replay", run, "--frame-rate", "3"}, "--frame-rate is for folders"},
       {{"replay", run, "--depth-scale", "9"}, "--depth-scale is for folders"},
       {{"ask", "where", "--question", "{}"}, "leave one of them out"},

@@ -2,9 +2,14 @@
 #include "prescene/interfaces/dds/dds_node.h"
 
 #include <gtest/gtest.h>
+#include <spawn.h>
+#include <sys/wait.h>
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
+#include <csignal>
+#include <cstdlib>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -18,6 +23,7 @@
 
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "tests/support/bus_domain.h"
+#include "tests/support/paths.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -359,12 +365,47 @@ TEST(DdsNode, SaysWhichInterfaceItUses) {
 
 TEST(DdsNode, UsesTheInterfaceThatItIsToldToUse) {
   DdsOptions here = options();
-  here.domain = 10 + (options().domain - 10 + 101) % 200;  // where no node of this process was before
+  here.domain = tests::another_domain();  // where no node of this process was before
   here.find_interfaces = true;
   here.interfaces = {"lo"};
   const auto node = DdsNode::create(here, {});
   ASSERT_TRUE(node.ok()) << node.status().message();
   EXPECT_EQ((*node)->interfaces().find("lo (index "), 0u) << (*node)->interfaces();
+}
+
+// Nodes that are kept to the loopback interface in the usual way have no multicast there.
+TEST(DdsNode, OnTheLoopbackInterfaceHearsThoseThatAreKeptToIt) {
+  DdsOptions ours = options();
+  ours.domain = tests::another_domain();
+  ours.interfaces = {"lo"};
+  const auto reader = DdsNode::create(ours, {});
+  ASSERT_TRUE(reader.ok()) << reader.status().message();
+  ASSERT_TRUE((*reader)->subscribe("/kept/text", "std_msgs/msg/String", TopicQos::kReliable, {}).ok());
+  const std::string peer = (tests::build_dir() / "tests" / "security_peer").string();
+  const std::string domain = std::to_string(ours.domain);
+  std::array<const char*, 7> words = {peer.c_str(), domain.c_str(), "-", "kept", "talk", "/kept/text", nullptr};
+  std::array<const char*, 2> environment = {
+      "CYCLONEDDS_URI=<General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces></General>", nullptr};
+  pid_t child = -1;
+  ASSERT_EQ(posix_spawn(&child, peer.c_str(), nullptr, nullptr, const_cast<char**>(words.data()),
+                        const_cast<char**>(environment.data())),
+            0);
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while ((*reader)->matched_writers("/kept/text") == 0 && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::yield();
+  EXPECT_EQ((*reader)->matched_writers("/kept/text"), 1);
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+}
+
+TEST(DdsNode, InterfacesOfTwoPlacesAreRefused) {
+  DdsOptions twice = options();
+  twice.interfaces = {"lo"};
+  setenv("CYCLONEDDS_URI", "<General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces></General>", 1);
+  const core::Status refused = DdsNode::create(twice, {}).status();
+  unsetenv("CYCLONEDDS_URI");
+  EXPECT_EQ(refused.code(), core::StatusCode::kInvalidInput);
+  EXPECT_NE(refused.message().find("CYCLONEDDS_URI"), std::string::npos) << refused.message();
 }
 
 TEST(DdsNode, RefusesNamesOfInterfacesAndPeersThatAreNone) {

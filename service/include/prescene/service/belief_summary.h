@@ -58,6 +58,8 @@ interfaces::RosDetection3dArray detections_of(const BeliefSummary& summary, cons
 interfaces::RosPoseWithCovarianceStamped pose_of(const ObjectSummary& object, core::TimeNs stamp_ns,
                                                  const std::string& world_frame);
 /// The frame prescene/OBJECT of each, from the world's.
+/// Of the frames of objects: "prescene/mug".
+inline constexpr const char* kFramePrefix = "prescene/";
 interfaces::RosTfMessage transforms_of(const BeliefSummary& summary, const std::string& world_frame);
 /// Coarse meshes of a scene's models by name, made once for markers.
 using MarkerMeshes = std::map<std::string, geometry::TriangleMesh>;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A release that nobody reported: what is seen to have left the hand that is said to hold it is not held any more.
 //
-//   int released = infer_releases(options, belief);   // once a frame, after weight
+//   int released = infer_releases({}, belief);   // once a frame, after weight
 #pragma once
 
 #include "prescene/belief/belief.h"

@@ -48,6 +48,12 @@ struct QueryWorkerSettings {
   std::function<void(const std::string& progress)> on_progress = {};
 };
 
+/// {"cancel": question, "id": id}, the latter optional.
+struct CancelRequest {
+  std::string question;
+  std::string id;
+};
+
 /// What became of the questions since the start. Each that was asked and neither waits nor is worked on counts as
 /// answered, refused, unanswered or repeated, once.
 struct QueryCounts {
@@ -86,8 +92,9 @@ class QueryWorker {
   /// answer that says so. A question that waits to be simulated, or is being simulated, is not taken again: clients ask
   /// again when an answer is late. Another question with its id is refused: its asker would take the first one's answer
   /// for its own. {"cancel": ID} ends the work on a question: one that waits is refused, one that is being simulated is
-  /// answered from what was simulated until now. Where no question with the id waits, that is refused. No exception
-  /// leaves it.
+  /// answered from what was simulated until now. Such a request is answered itself only if it has an "id" of its own:
+  /// {"id", "cancelled": ID}, or an error where no question with that id waits. One that finds no room counts as a
+  /// refused question. No exception leaves it.
   void ask(std::string question_json);
 
   QueryCounts counts() const;
@@ -103,10 +110,15 @@ class QueryWorker {
 
  private:
   using Question = std::variant<belief::Query, belief::ExplainQuestion>;
+  /// A question to simulate, and what ends the work on it.
+  struct Work {
+    std::shared_ptr<const Question> question;  ///< Null: none.
+    std::shared_ptr<core::Cancellation> end;
+  };
   // No exception leaves these.
   void read_questions();
   void read(const std::string& question_json);
-  void cancel(const std::string& id);
+  void cancel(const CancelRequest& request);
   void simulate_questions();
   struct Reply {
     std::string text;
@@ -146,9 +158,8 @@ class QueryWorker {
   std::deque<std::string> unread_;
   std::size_t unread_bytes_ = 0;
   std::deque<std::string> too_many_;  // ids of questions that found no room
-  std::deque<std::shared_ptr<const Question>> waiting_;
-  std::shared_ptr<const Question> in_work_;          // null: none
-  std::shared_ptr<core::Cancellation> end_of_work_;  // of that question
+  std::deque<Work> waiting_;
+  Work in_work_;
   QueryCounts counts_;
 
   std::thread reader_, simulator_;  // last: they use all above

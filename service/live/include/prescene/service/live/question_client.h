@@ -43,9 +43,13 @@ class QuestionClient {
 
   std::mutex mutex_;
   std::condition_variable changed_;
+  struct Told {
+    std::mutex mutex;  // guards what follows; not held while mutex_ is taken
+    core::ProgressSink progress;
+  };
   struct Waited {
     std::optional<std::string> answer;  // nothing until it came
-    core::ProgressSink progress;
+    std::shared_ptr<Told> told;
   };
   std::map<std::string, Waited> answers_;  // by id, of those waited for
   interfaces::DdsPublisher queries_;

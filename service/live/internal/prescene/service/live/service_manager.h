@@ -3,10 +3,7 @@
 // ready, how it is, that it is alive, that it stops. Where no manager listens, nothing is told.
 //
 //   ServiceManager manager(manager_of_environment());
-//   while (...) {
-//     manager.note_turn();  // of the loop that must not stand still
-//     ...
-//   }
+//   manager.note_turn();  // in each turn of the loop that must not stand still
 //   manager.tell_stopping();
 #pragma once
 

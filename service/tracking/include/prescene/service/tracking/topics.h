@@ -55,6 +55,8 @@ inline constexpr const char* kBeliefTopic = "/prescene/belief";      ///< out: s
 inline constexpr const char* kDetectionsTopic = "/prescene/detections";  ///< out: vision_msgs/Detection3DArray
 inline constexpr const char* kMarkersTopic = "/prescene/markers";        ///< out: visualization_msgs/MarkerArray
 inline constexpr const char* kDiagnosticsTopic = "/diagnostics";         ///< out: diagnostic_msgs/DiagnosticArray
+/// Whether a message holds transforms of objects alone, which a service published: none of the robot's.
+bool are_of_objects(const interfaces::ReceivedMessage& message);
 /// out: geometry_msgs/PoseWithCovarianceStamped of each object
 std::string pose_topic(const std::string& object);
 
