@@ -52,8 +52,8 @@ int another_domain() {
 }
 
 int own_domain() {
-  static const int domain = another_domain();
-  return domain;
+  static const int kDomain = another_domain();
+  return kDomain;
 }
 
 }  // namespace prescene::tests

@@ -28,8 +28,8 @@ constexpr const char* kBelief = "/prescene/belief";
 
 /// Not that of the other tests of this program: their nodes know no keys.
 std::string secured_domain() {
-  static const int domain = tests::another_domain();
-  return std::to_string(domain);
+  static const int kDomain = tests::another_domain();
+  return std::to_string(kDomain);
 }
 
 /// A security_peer in a process of its own, killed at the end.
