@@ -182,7 +182,10 @@ std::string unit_value(const std::string& key) {
 
 TEST_F(BusFaults, StartedAgainByASupervisorItTracksAgain) {
   const double pause = std::atof(unit_value("RestartSec").c_str());
-  EXPECT_EQ(unit_value("Restart"), "on-failure");
+  EXPECT_EQ(unit_value("Restart"), "always") << "systemd takes an end by some signals for a clean one";
+  EXPECT_EQ(unit_value("RestartPreventExitStatus"), "2");
+  EXPECT_EQ(unit_value("Type"), "notify");
+  EXPECT_GT(std::atof(unit_value("WatchdogSec").c_str()), 10.0) << "a first frame of many objects takes seconds";
   EXPECT_EQ(unit_value("StartLimitIntervalSec"), "0") << "systemd would give up for good";
   EXPECT_GT(pause, 0.0);
   std::vector<double> seconds;
