@@ -10,53 +10,13 @@
 namespace prescene::service {
 namespace {
 
-std::string with_error(const ScoreValue& score, double unit, int digits) {
-  return core::fixed_text(unit * score.value, digits) + " +- " + core::fixed_text(unit * score.standard_error, digits);
-}
-
 std::string scores_text(const TossScores& scores) {
-  std::vector<std::vector<std::string>> rows = {{"", "value"},
-                                                {"tosses", std::to_string(scores.n)},
-                                                {"of them no twins", std::to_string(scores.independent)},
-                                                {"right side up, %", with_error(scores.right_side, 100.0, 1)},
-                                                {"Brier score of the side", with_error(scores.brier, 1.0, 3)},
-                                                {"log score", with_error(scores.log_score, 1.0, 3)},
-                                                {"median position error, mm", with_error(scores.median_error, 1e3, 1)},
-                                                {"90 % position error, mm", with_error(scores.p90_error, 1e3, 1)},
-                                                {"ends off by, x, mm", with_error(scores.mean_error[0], 1e3, 1)},
-                                                {"ends off by, y, mm", with_error(scores.mean_error[1], 1e3, 1)}};
+  TextTable rows = score_rows(scores, " +- ");
+  rows.insert(rows.begin(), {"", "value"});
   for (const CoverageValue& each : scores.coverage)
-    rows.push_back({"in " + core::fixed_text(100.0 * each.level, 0) + " % region, %", with_error(each.held, 100.0, 1)});
-  std::vector<std::vector<std::string>> reliability = {{"probability of a side", "n", "mean", "came true"}};
-  for (const ReliabilityRow& row : scores.reliability)
-    reliability.push_back({core::fixed_text(row.low, 2) + " to " + core::fixed_text(row.high, 2), std::to_string(row.n),
-                           core::fixed_text(row.mean, 3), core::fixed_text(row.observed, 3)});
-  return table(rows) + "\n" + table(reliability);
-}
-
-std::string each_text(const std::vector<ScoredToss>& tosses) {
-  std::vector<std::vector<std::string>> rows = {
-      {"toss", "side", "its probability", "Brier", "position error, mm", "in region of"}};
-  for (const ScoredToss& toss : tosses)
-    rows.push_back({toss.name, kSides[toss.true_side], core::fixed_text(toss.side_probabilities[toss.true_side], 3),
-                    core::fixed_text(toss.brier, 3), core::fixed_text(1e3 * toss.error(), 1),
-                    core::fixed_text(100.0 * toss.region_mass, 1) + " %"});
-  return table(rows) + "\n";
-}
-
-std::string folds_text(const std::vector<EvaluatedFold>& folds) {
-  std::vector<std::vector<std::string>> rows = {{"part", "fitted", "scored", "start noise, mm", "mrad", "scatter, %"}};
-  for (const simulation::CalibratedParameter& p : folds.front().calibration.motion.parameters)
-    rows.front().push_back(to_string(p.parameter));
-  for (std::size_t i = 0; i < folds.size(); ++i) {
-    const simulation::ThrowScatter& throws = folds[i].calibration.throws;
-    rows.push_back({std::to_string(i + 1), std::to_string(folds[i].fitted), std::to_string(folds[i].scored),
-                    core::fixed_text(1e3 * throws.position, 2), core::fixed_text(1e3 * throws.rotation, 1),
-                    core::fixed_text(100.0 * throws.friction, 1)});
-    for (const simulation::CalibratedParameter& p : folds[i].calibration.motion.parameters)
-      rows.back().push_back(core::fixed_text(p.value, 4));
-  }
-  return table(rows) + "\n";
+    rows.push_back(
+        {"in " + core::fixed_text(100.0 * each.level, 0) + " % region, %", with_error(each.held, 100.0, 1, " +- ")});
+  return table(rows) + "\n" + table(reliability_table(scores));
 }
 
 }  // namespace
@@ -91,8 +51,8 @@ core::Status evaluate_folder(const EvaluateFolderOptions& options, VerbContext& 
   document["seed"] = context.options().seed;
   document.update(to_json(*found));
   std::string text;
-  if (options.each) text += each_text(found->tosses);
-  if (!found->folds.empty()) text += folds_text(found->folds);
+  if (options.each) text += table(toss_table(found->tosses)) + "\n";
+  if (!found->folds.empty()) text += table(fold_table(found->folds)) + "\n";
   text += scores_text(found->scores);
   if (!found->remarks.empty()) text += "\n";
   for (const std::string& remark : found->remarks) text += remark + "\n";

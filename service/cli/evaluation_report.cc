@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -19,8 +20,11 @@ using interfaces::TextBlock;
 
 constexpr double kQuantile95 = 1.96;
 
-std::string value_text(const ScoreValue& score, double unit, int digits) {
-  return fixed_text(unit * score.value, digits) + " ± " + fixed_text(unit * score.standard_error, digits);
+TableBlock block_of(TextTable table) {
+  TableBlock block;
+  block.columns = std::move(table.front());
+  block.rows.assign(std::make_move_iterator(table.begin() + 1), std::make_move_iterator(table.end()));
+  return block;
 }
 
 /// Of a share of n, after Wilson [Brown, Cai & DasGupta 2001].
@@ -32,18 +36,9 @@ std::pair<double, double> wilson_interval(double share, int n) {
 }
 
 ReportSection score_section(const TossEvaluation& evaluation) {
-  const TossScores& scores = evaluation.scores;
   TableBlock table;
   table.columns = {"score", "value ± standard error"};
-  table.rows = {{"tosses", std::to_string(scores.n)},
-                {"of them no twins", std::to_string(scores.independent)},
-                {"right side up, %", value_text(scores.right_side, 100.0, 1)},
-                {"Brier score of the side", value_text(scores.brier, 1.0, 3)},
-                {"log score", value_text(scores.log_score, 1.0, 3)},
-                {"median position error, mm", value_text(scores.median_error, 1e3, 1)},
-                {"90 % position error, mm", value_text(scores.p90_error, 1e3, 1)},
-                {"ends off by, x, mm", value_text(scores.mean_error[0], 1e3, 1)},
-                {"ends off by, y, mm", value_text(scores.mean_error[1], 1e3, 1)}};
+  table.rows = score_rows(evaluation.scores, " ± ");
   ReportSection section{"How well the tosses are forecast", {std::move(table)}};
   for (const std::string& remark : evaluation.remarks) section.blocks.push_back(TextBlock{remark});
   return section;
@@ -76,12 +71,8 @@ ReportSection reliability_section(const TossScores& scores) {
   }
   regions.curves = {std::move(held), std::move(wanted)};
   regions.from_zero = false;
-  TableBlock table;
-  table.columns = {"probability of a side", "n", "mean", "came true"};
-  for (const ReliabilityRow& row : scores.reliability)
-    table.rows.push_back({fixed_text(row.low, 2) + " to " + fixed_text(row.high, 2), std::to_string(row.n),
-                          fixed_text(row.mean, 3), fixed_text(row.observed, 3)});
-  return {"Whether probabilities mean what they say", {std::move(sides), std::move(regions), std::move(table)}};
+  return {"Whether probabilities mean what they say",
+          {std::move(sides), std::move(regions), block_of(reliability_table(scores))}};
 }
 
 ReportSection error_section(const std::vector<ScoredToss>& tosses) {
@@ -100,39 +91,69 @@ ReportSection error_section(const std::vector<ScoredToss>& tosses) {
 }
 
 ReportSection fold_section(const std::vector<EvaluatedFold>& folds) {
-  TableBlock table;
+  TableBlock table = block_of(fold_table(folds));
   table.caption = "Each part is forecast by the model that the others are fitted best by.";
-  table.columns = {"part", "fitted", "scored", "start noise, mm", "mrad", "scatter of friction, %"};
-  for (const simulation::CalibratedParameter& p : folds.front().calibration.motion.parameters)
-    table.columns.push_back(to_string(p.parameter));
-  for (std::size_t i = 0; i < folds.size(); ++i) {
-    const simulation::ThrowScatter& throws = folds[i].calibration.throws;
-    table.rows.push_back({std::to_string(i + 1), std::to_string(folds[i].fitted), std::to_string(folds[i].scored),
-                          fixed_text(1e3 * throws.position, 2), fixed_text(1e3 * throws.rotation, 1),
-                          fixed_text(100.0 * throws.friction, 1)});
-    for (const simulation::CalibratedParameter& p : folds[i].calibration.motion.parameters)
-      table.rows.back().push_back(fixed_text(p.value, 4));
-  }
   return {"The fits", {std::move(table)}};
 }
 
-ReportSection toss_section(const std::vector<ScoredToss>& tosses) {
-  TableBlock table;
-  table.columns = {"toss", "side", "its probability", "Brier", "position error, mm", "in the region of, %"};
-  for (const ScoredToss& toss : tosses)
-    table.rows.push_back({toss.name, kSides[toss.true_side], fixed_text(toss.side_probabilities[toss.true_side], 3),
-                          fixed_text(toss.brier, 3), fixed_text(1e3 * toss.error(), 1),
-                          fixed_text(100.0 * toss.region_mass, 1)});
-  return {"Each toss", {std::move(table)}};
+}  // namespace
+
+std::string with_error(const ScoreValue& score, double per_unit, int digits, const std::string& plus_minus) {
+  return fixed_text(per_unit * score.value, digits) + plus_minus + fixed_text(per_unit * score.standard_error, digits);
 }
 
-}  // namespace
+TextTable score_rows(const TossScores& scores, const std::string& plus_minus) {
+  const auto value = [&](const ScoreValue& score, double per_unit, int digits) {
+    return with_error(score, per_unit, digits, plus_minus);
+  };
+  return {{"tosses", std::to_string(scores.n)},
+          {"of them no twins", std::to_string(scores.independent)},
+          {"right side up, %", value(scores.right_side, 100.0, 1)},
+          {"Brier score of the side", value(scores.brier, 1.0, 3)},
+          {"log score", value(scores.log_score, 1.0, 3)},
+          {"median position error, mm", value(scores.median_error, 1e3, 1)},
+          {"90 % position error, mm", value(scores.p90_error, 1e3, 1)},
+          {"ends off by, x, mm", value(scores.mean_error[0], 1e3, 1)},
+          {"ends off by, y, mm", value(scores.mean_error[1], 1e3, 1)}};
+}
+
+TextTable reliability_table(const TossScores& scores) {
+  TextTable table = {{"probability of a side", "n", "mean", "came true"}};
+  for (const ReliabilityRow& row : scores.reliability)
+    table.push_back({fixed_text(row.low, 2) + " to " + fixed_text(row.high, 2), std::to_string(row.n),
+                     fixed_text(row.mean, 3), fixed_text(row.observed, 3)});
+  return table;
+}
+
+TextTable toss_table(const std::vector<ScoredToss>& tosses) {
+  TextTable table = {{"toss", "side", "its probability", "Brier", "position error, mm", "in region of"}};
+  for (const ScoredToss& toss : tosses)
+    table.push_back({toss.name, kSides[toss.true_side], fixed_text(toss.side_probabilities[toss.true_side], 3),
+                     fixed_text(toss.brier, 3), fixed_text(1e3 * toss.error(), 1),
+                     fixed_text(100.0 * toss.region_mass, 1) + " %"});
+  return table;
+}
+
+TextTable fold_table(const std::vector<EvaluatedFold>& folds) {
+  TextTable table = {{"part", "fitted", "scored", "start noise, mm", "mrad", "scatter, %"}};
+  for (const simulation::CalibratedParameter& p : folds.front().calibration.motion.parameters)
+    table.front().push_back(to_string(p.parameter));
+  for (std::size_t i = 0; i < folds.size(); ++i) {
+    const simulation::ThrowScatter& throws = folds[i].calibration.throws;
+    table.push_back({std::to_string(i + 1), std::to_string(folds[i].fitted), std::to_string(folds[i].scored),
+                     fixed_text(1e3 * throws.position, 2), fixed_text(1e3 * throws.rotation, 1),
+                     fixed_text(100.0 * throws.friction, 1)});
+    for (const simulation::CalibratedParameter& p : folds[i].calibration.motion.parameters)
+      table.back().push_back(fixed_text(p.value, 4));
+  }
+  return table;
+}
 
 std::vector<ReportSection> evaluation_sections(const TossEvaluation& evaluation) {
   std::vector<ReportSection> sections = {score_section(evaluation), reliability_section(evaluation.scores),
                                          error_section(evaluation.tosses)};
   if (!evaluation.folds.empty()) sections.push_back(fold_section(evaluation.folds));
-  sections.push_back(toss_section(evaluation.tosses));
+  sections.push_back({"Each toss", {block_of(toss_table(evaluation.tosses))}});
   return sections;
 }
 
