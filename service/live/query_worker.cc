@@ -49,7 +49,7 @@ std::optional<core::Result<CancelRequest>> cancel_request(const std::string& tex
   const auto document = belief::parse_json(text, kLongestWithId);
   if (!document || !document->is_object() || !document->contains("cancel")) return std::nullopt;
   const auto& question = document->at("cancel");
-  CancelRequest request{question.is_string() ? question.get<std::string>() : "", id_of(text)};
+  CancelRequest request{question.is_string() ? question.get<std::string>() : "", id_of_document(*document)};
   if (!request.question.empty() && document->size() == (document->contains("id") ? 2U : 1U)) return request;
   return core::invalid_input("cancel: give the id of a question: {\"cancel\": \"7\"}");
 }
@@ -310,11 +310,12 @@ QueryWorker::Reply QueryWorker::reply_to(const Question& question, const core::C
   context.timeline = settings_.timeline;
   if (&cancelled != &stop_) context.progress = progress_of(id_in(question));  // `where` is answered at once
   if (context.progress) context.progress({0.0, std::nullopt, "begun"});
-  return std::visit([&](const auto& one) { return reply_to(one, context, cancelled); }, question);
+  if (const auto* to_explain = std::get_if<belief::ExplainQuestion>(&question))
+    return reply_to(*to_explain, context, cancelled);
+  return reply_to(std::get<belief::Query>(question), context);
 }
 
-QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query, const queries::QueryContext& context,
-                                         const core::Cancellation& /*cancelled*/) {
+QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query, const queries::QueryContext& context) {
   const std::shared_ptr<const belief::Belief> belief = snapshot_();
   // Before the first frame the scene file is all that is known, and says more than the particles drawn from it.
   const belief::Answer answer = belief->step == 0 ? queries::answer(belief->scene, belief->seed, query, context)

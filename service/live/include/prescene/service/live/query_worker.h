@@ -136,7 +136,7 @@ class QueryWorker {
   Reply reply_to(const Question& question, const core::Cancellation& cancelled);
   /// Of the question with that id; empty where nobody is told.
   core::ProgressSink progress_of(const std::string& id) const;
-  Reply reply_to(const belief::Query& query, const queries::QueryContext& context, const core::Cancellation& cancelled);
+  Reply reply_to(const belief::Query& query, const queries::QueryContext& context);
   Reply reply_to(const belief::ExplainQuestion& question, queries::QueryContext context,
                  const core::Cancellation& cancelled);
   /// In a handler, of an exception while `doing`: counts it as a failure unless the memory ended, and says what to
