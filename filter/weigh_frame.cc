@@ -7,6 +7,7 @@
 #include "frame_step.h"
 #include "prescene/filter/operators/initialise.h"
 #include "prescene/filter/operators/rivals.h"
+#include "prescene/filter/operators/standing.h"
 #include "prescene/filter/operators/world_terms.h"
 
 namespace prescene::filter {
@@ -14,6 +15,26 @@ namespace prescene::filter {
 using belief::Belief;
 using belief::ObjectBelief;
 using belief::Particle;
+
+namespace {
+
+constexpr double kSupportAround = 2.5;   // radii of the object; so far around it its support's height is measured
+constexpr double kMostInSupport = 0.25;  // share of a pose that may be inside of a support; as of finds
+
+/// How far above where the scene has them the frame shows the supports about an object, m. 0 where the pose is clear
+/// of them as the scene has them: it does not matter there.
+double support_offset(const FilterFrame& frame, const SearchTarget& target, const Pose& X_WO, double tolerance) {
+  if (frame.supports.empty() || !(frame.surfaces->overlap(*target.mesh, X_WO, tolerance) > 0.0)) return 0.0;
+  const auto radius = static_cast<double>(target.mesh->radius);
+  const Vector3d above = X_WO * target.centre() + 2.0 * radius * frame.up_W;
+  const auto hit = frame.surfaces->first_along(above, -frame.up_W, 4.0 * radius);
+  if (!hit) return 0.0;
+  return support_height(frame.terms, frame.supports, frame.X_CW, above - hit->distance * frame.up_W, frame.up_W, radius,
+                        kSupportAround * radius)
+      .offset;
+}
+
+}  // namespace
 
 SearchTarget ParticleFilter::target_in(const FrameStep& step, std::size_t object) const {
   return target_of(step.belief().objects[object], *step.belief().scene, step.frame, tools_);
@@ -50,6 +71,8 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
                         .shape = falls ? shape.get() : nullptr,
                         .up_W = frame.up_W,
                         .support_depth = &frame.supports,
+                        .support_offset = support_offset(frame, target, belief::heaviest(seen.particles).X_WO,
+                                                         settings_.weight.support_tolerance),
                         .was_unseen = was_unseen_by(seen, step.observation.camera),
                         .depth = step.observation.frame.depth.get(),
                         .camera = step.observation.frame.camera};
@@ -63,6 +86,11 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
   report = weight(terms, target, frame.X_WC, dt, settings_.weight, tools_,
                   stream.at(belief.step, static_cast<std::uint32_t>(object)), seen.particles, context);
   if (report.all_impossible) step.result.degraded |= kImpossibleWeights;
+  // What looks like the top of something inside a support is the support.
+  Pose followed = belief::heaviest(seen.particles).X_WO;
+  followed.translation -= context.support_offset * frame.up_W;
+  if (frame.surfaces->overlap(*target.mesh, followed, settings_.weight.support_tolerance) > kMostInSupport)
+    report.evidence_per_pixel = std::min(0.0, report.evidence_per_pixel);
   // What is hidden is not distinguished by its turn.
   if (report.hidden_weight < 0.5 && report.visible_share >= settings_.weight.hidden_share) {
     const bool is_looked_at = is_sharp(step.observation.camera) && report.visible_share >= kMostlySeen;

@@ -18,7 +18,7 @@ constexpr double kSharedShift = 0.003;       // m; an outline serves for poses s
 constexpr double kSharedTurn = 0.03;         // rad
 constexpr double kSupportAround = 2.5;       // radii of the object; so far around it its support's height is measured
 constexpr double kContactHeight = 0.001;     // m, error of a support's height where no frame can tell
-constexpr double kFullOverlap = 0.25;        // share of a hidden pose's overlap with a support from which ...
+constexpr double kFullOverlap = 0.25;        // share of a pose's overlap with a support from which ...
 constexpr double kLogInSupport = -12.0;      // nats; ... it costs this; less in proportion
 
 /// What the outline is worth: 0 where nothing ends at it, 1 where enough does.
@@ -202,6 +202,14 @@ double ParticleUpdate::log_overlap(const belief::Particle& particle) const {
   const SupportSurfaces* solids = is_held || context_.solids == nullptr ? context_.supports : context_.solids;
   if (solids == nullptr || solids->empty()) return 0.0;
   const double overlap = solids->overlap(*target_.mesh, particle.X_WO, options_.support_tolerance);
+  return kLogInSupport * std::min(1.0, overlap / kFullOverlap);
+}
+
+double ParticleUpdate::log_in_support(const Pose& X_WO) const {
+  if (context_.supports == nullptr || context_.supports->empty()) return 0.0;
+  Pose beside = X_WO;
+  beside.translation -= context_.support_offset * context_.up_W;
+  const double overlap = context_.supports->overlap(*target_.mesh, beside, options_.support_tolerance);
   return kLogInSupport * std::min(1.0, overlap / kFullOverlap);
 }
 

@@ -93,6 +93,9 @@ class ParticleUpdate {
   /// What it costs to be where a support is, or a body of the robot. What is held was seen in the hand, whatever the
   /// hand's shape says.
   double log_overlap(const belief::Particle& particle) const;
+  /// What it costs a pose that is seen to be where a support is: the supports themselves look like the top of what is
+  /// in them. They are taken to be where the frame shows them.
+  double log_in_support(const Pose& X_WO) const;
 
   bool was_unseen() const { return context_.was_unseen; }
   double weight_share() const { return weight_share_; }

@@ -57,7 +57,7 @@ ParticleWeight update(const ParticleUpdate& frame, double dt, bool first, const 
       log_moved = frame.weight_share() * worth(moved.evidence.log_ratio, moved.outline, options) -
                   0.5 * mode.shift.dot(predicted.information * mode.shift) +
                   0.5 * (mode.log_determinant - predicted.log_determinant);
-    log_moved += log_appears;
+    log_moved += log_appears + frame.log_in_support(mode.X_WO);
   }
   // A mode that is hidden as well explains nothing by having moved.
   const bool mode_hidden = shown_share(moved.evidence) < options.hidden_share;

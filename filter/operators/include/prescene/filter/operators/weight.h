@@ -27,8 +27,8 @@ struct WeightOptions {
   double hidden_share = 0.35;
   /// nats. The log prior odds of becoming hidden, and of coming into sight again. Range -20 to 0. Chosen.
   double log_hidden = -4.0;
-  /// m. Hidden poses that reach further than this into a support are improbable; contacts are not known better. Range 0
-  /// to 0.1. Chosen.
+  /// m. Poses that reach further than this into a support are improbable; contacts are not known better. Range 0 to
+  /// 0.1. Chosen.
   double support_tolerance = 0.015;
   /// m/s. A mode is refused if the object would have had to move there faster than this, beyond its predicted spread.
   /// Range 0.1 to 20. Chosen.
@@ -52,13 +52,15 @@ struct ParticleWeight {
 
 /// What is known of the object besides the frame.
 struct WeightContext {
-  const SupportSurfaces* supports = nullptr;  ///< Where hidden poses cannot be; null = anywhere.
+  const SupportSurfaces* supports = nullptr;  ///< Where no pose can be; null = anywhere.
   const SupportSurfaces* solids = nullptr;    ///< The same of what no hand holds; null = no more.
   const RestingShape* shape = nullptr;        ///< How it may stand on `supports`; null = in any way.
   Vector3d up_W = Vector3d::UnitZ();          ///< Against gravity.
   /// Depth of the supports alone, of the size of the frame's terms: how far off the frame shows them; null = not at
   /// all.
   const geometry::DepthImage* support_depth = nullptr;
+  /// m; so far above where the scene has them, the frame shows the supports about the object (support_height()).
+  double support_offset = 0.0;
   bool was_unseen = false;  ///< In the frame before.
   /// The full depth image and its camera, for where the object ends in it; null = poses follow depth residuals alone.
   const geometry::DepthImage* depth = nullptr;
