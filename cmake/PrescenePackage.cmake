@@ -49,6 +49,9 @@ install(FILES packaging/prescene.bash DESTINATION "${CMAKE_INSTALL_DATADIR}/bash
 install(FILES packaging/service.conf DESTINATION "${CMAKE_INSTALL_DOCDIR}/examples" COMPONENT program_files)
 # The sources of a ROS package, for who calls the service /prescene/ask.
 install(DIRECTORY packaging/prescene_msgs DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files)
+# For `ros2 launch` and `ros2 param load`.
+install(DIRECTORY packaging/launch DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files
+        FILES_MATCHING PATTERN "*.py" PATTERN "*.yaml")
 install(PROGRAMS tools/security_keys DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files)
 install(DIRECTORY scenarios DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files FILES_MATCHING PATTERN "*.yaml")
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documentation)

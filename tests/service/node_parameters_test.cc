@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "prescene/core/random.h"
@@ -224,6 +226,48 @@ TEST_F(ParametersOnBus, AreListedDescribedAndRead) {
   EXPECT_THAT(history->at(0).range, ElementsAre(std::array<double, 3>{0.0, 3600.0, 0.0}));
   EXPECT_FALSE(history->at(0).read_only);
   EXPECT_THAT(client_.list({"none"})->at(0), IsEmpty());
+}
+
+// packaging/launch/parameters.yaml: lines such as "    history: 20.0", or "    # new_objects: true".
+TEST_F(ParametersOnBus, TheFileForRosNamesThoseThatCanBeSetWithTheValuesThatTheyHave) {
+  begin();
+  std::map<std::string, std::string> in_file;
+  std::ifstream file(tests::source_dir() / "packaging/launch/parameters.yaml");
+  bool is_below = false;
+  for (std::string line; std::getline(file, line);) {
+    if (is_below) {
+      const std::size_t name = line.find_first_not_of(" #"), colon = line.find(": ");
+      ASSERT_TRUE(line.starts_with("    ") && colon != std::string::npos) << line;
+      const bool is_comment = line.find('#') < name;
+      in_file[line.substr(name, colon - name)] = is_comment ? "" : line.substr(colon + 2);
+    }
+    is_below = is_below || line == "  ros__parameters:";
+  }
+  const auto names = client_.list();
+  ASSERT_TRUE(names.has_value());
+  const auto described = client_.describe(names->at(0));
+  ASSERT_TRUE(described.has_value());
+  std::size_t settable = 0;
+  for (const tests::ParamDescription& parameter : *described) {
+    if (parameter.read_only) {
+      EXPECT_FALSE(in_file.contains(parameter.name)) << parameter.name;
+      continue;
+    }
+    ++settable;
+    ASSERT_TRUE(in_file.contains(parameter.name)) << parameter.name;
+    const std::string& text = in_file[parameter.name];
+    if (text.empty()) continue;
+    if (parameter.type == 4) {
+      EXPECT_EQ(text, value(parameter.name).text) << parameter.name;
+    } else {
+      // ROS takes a number with a point for a double, and one without for an integer.
+      EXPECT_EQ(parameter.type, 3) << parameter.name;
+      EXPECT_NE(text.find('.'), std::string::npos) << parameter.name;
+      EXPECT_EQ(std::stod(text), value(parameter.name).number) << parameter.name;
+    }
+  }
+  EXPECT_EQ(settable, in_file.size());
+  EXPECT_TRUE(stop().ok());
 }
 
 TEST_F(ParametersOnBus, AreSetToldOfAndTakeEffect) {
