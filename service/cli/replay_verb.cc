@@ -174,6 +174,7 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
   warn_of_unchecked(options, result.unchecked, context);
   context.print({{"recording", options.input},
                  {"messages", result.messages},
+                 {"rounds", result.rounds},
                  {"beliefs", result.beliefs.size()},
                  {"objects", states.json()},
                  {"tracking", tracking_json(rows)},
@@ -183,10 +184,14 @@ core::Status run_over_dds(ReplayOptions& options, VerbContext& context) {
                  {"missing", result.missing},
                  {"damaged_records", damaged.count()},
                  {"unchecked", result.unchecked}},
-                std::to_string(result.messages) + " messages played, " + std::to_string(result.beliefs.size()) +
-                    " beliefs came back\n" + answers_text(result.answers) + foreseen_text_of(foreseen) + states.text() +
-                    tracking_text(rows));
-  if (context.cancellation().requested()) return core::cancelled("stopped on request; what was done is printed");
+                std::to_string(result.messages) + " messages played" +
+                    (options.bus.loop ? " in " + counted(result.rounds, "round") : "") + ", " +
+                    std::to_string(result.beliefs.size()) + " beliefs came back" +
+                    (options.bus.loop ? " in the last one\n" : "\n") + answers_text(result.answers) +
+                    foreseen_text_of(foreseen) + states.text() + tracking_text(rows));
+  // A loop has no other end.
+  if (context.cancellation().requested() && !options.bus.loop)
+    return core::cancelled("stopped on request; what was done is printed");
   PRESCENE_RETURN_IF_ERROR(check_answers(result.answers));
   return check_files(options, result.missing);
 }
@@ -434,6 +439,10 @@ Verb add_replay_verb(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--ask", options->questions, "Over DDS: SECONDS:JSON, a question to ask at that time; repeatable")
       ->needs("--over-dds");
+  verb->add_flag("--loop", options->bus.loop,
+                 "Over DDS: play it again and again from the start, with the same stamps, until Ctrl-C")
+      ->needs("--over-dds")
+      ->excludes("--ask");
   add_input_options(*verb, options->depth_scale, options->frame_rate, options->read);
   verb->add_option("--from", options->read.from,
                    "Begin so many seconds after the recording's first message: the belief begins anew there")
@@ -442,7 +451,8 @@ Verb add_replay_verb(CLI::App& app) {
   verb->add_option("--to", options->read.to, "End so many seconds after the recording's first message")
       ->check(number_between(0.0, 1e9));
   verb->add_option("--report", options->report, "Write an HTML page with pictures, tables and timelines")
-      ->check(file_name());
+      ->check(file_name())
+      ->excludes("--loop");
   verb->add_option("--timeline", options->timeline_file,
                    "Write when which relations held (on, in, touches, moves, falls, ...) as JSON")
       ->check(file_name());

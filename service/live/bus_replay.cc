@@ -29,6 +29,8 @@ using std::chrono::steady_clock;
 
 // How late a request to cancel is seen.
 constexpr std::chrono::milliseconds kSlice(50);
+// s; a recording of one instant is not played again and again as fast as can be.
+constexpr double kShortestRound = 0.1;
 // s; a recording whose times are years apart is played until someone stops it.
 constexpr double kLongestWait = 1e9;
 
@@ -83,6 +85,11 @@ class Listener {
     while (!cancellation.requested() && steady_clock::now() < until) {
       changed_.wait_until(lock, std::min(until, steady_clock::now() + kSlice));
     }
+  }
+  /// A loop may go on for days: only the beliefs of its last round are kept.
+  void forget_beliefs() {
+    const std::lock_guard lock(mutex_);
+    beliefs_.clear();
   }
   void move_to(BusReplayResult& result) {
     const std::lock_guard lock(mutex_);
@@ -164,6 +171,8 @@ class BusPlayer {
 
 core::Status validate(const BusReplayOptions& options) {
   PRESCENE_RETURN_IF_ERROR(belief::check_number(options.speed, kReplaySpeeds).at("speed"));
+  if (options.loop && !options.questions.empty())
+    return core::invalid_input("questions are not asked in a loop: leave them out, or play once");
   for (const TimedQuestion& question : options.questions) {
     if (!(question.at >= 0.0) || !std::isfinite(question.at))
       return core::invalid_input("the time of a question is " + core::fixed_text(question.at, 2) +
@@ -192,6 +201,65 @@ core::Result<std::optional<DdsPublisher>> publisher_for(const interfaces::Receiv
   passed_over.insert(message.topic);
   return std::optional<DdsPublisher>();
 }
+
+/// Plays the recording once.
+struct Round {
+  const BusReplayOptions& options;
+  const core::Cancellation& cancellation;
+  const core::ProgressSink& progress;
+  const core::LogSink& log;
+  const std::function<void(const RecordedEntry&)>& on_entry;
+  interfaces::DdsNode& node;
+  BusPlayer& player;
+  Listener& listener;
+
+  core::Status play(const std::filesystem::path& path, std::set<std::string>& passed_over, BusReplayResult& result) {
+    RecordingReadOptions again = options.read;
+    again.check_data = options.read.salvage;  // It was just now, but what is salvaged has its loss told.
+    PRESCENE_TRY(const auto reader, RecordingReader::open(path, again));
+    const auto start = steady_clock::now();
+    core::TimeNs last_stamp_ns = 0;
+    double at = 0.0;
+    std::size_t asked = 0;
+    std::uint64_t entries = 0;
+    const double total = static_cast<double>(reader->message_count().value_or(0));
+    while (!cancellation.requested()) {
+      PRESCENE_TRY(const auto entry, reader->next());
+      if (!entry) break;
+      at = reader->seconds_into(*entry);
+      // What is needed from before goes first.
+      const double after = std::max(0.0, at - options.read.from);
+      listener.wait_until(start + seconds(after / options.speed), cancellation);
+      if (cancellation.requested()) break;
+      for (; asked < options.questions.size() && options.questions[asked].at <= at; ++asked)
+        PRESCENE_RETURN_IF_ERROR(player.ask(asked, options.questions[asked].at, options.questions[asked]));
+      if (on_entry) on_entry(*entry);
+      if (progress && total > 0.0) progress({static_cast<double>(++entries) / total, {}, ""});
+      if (!is_robots(*entry)) continue;
+      PRESCENE_TRY(const auto publisher, publisher_for(entry->message, player, passed_over));
+      if (!publisher) continue;
+      const core::Status published = node.publish_cdr(*publisher, entry->message.cdr);
+      if (!published.ok()) core::log(log, core::LogLevel::kWarning, entry->message.topic + ": " + published.message());
+      last_stamp_ns = std::max(last_stamp_ns, is_image_type(entry->message.type) ? entry->message.source_ns : 0);
+      ++result.messages;
+    }
+    for (; asked < options.questions.size() && !cancellation.requested(); ++asked) {
+      core::log(log, core::LogLevel::kWarning,
+                "the recording ends at " + core::fixed_text(at, 2) + " s, before the question for " +
+                    core::fixed_text(options.questions[asked].at, 2) + " s: it is asked now");
+      PRESCENE_RETURN_IF_ERROR(player.ask(asked, at, options.questions[asked]));
+    }
+    if (options.loop) {
+      listener.wait_until(start + seconds(kShortestRound), cancellation);
+    } else {
+      listener.wait_for_rest(last_stamp_ns, steady_clock::now() + seconds(options.wait_at_end), cancellation);
+    }
+    result.loss = reader->loss_text();
+    result.missing = reader->missing_text();
+    result.unchecked = reader->unchecked_text();
+    return core::ok_status();
+  }
+};
 
 }  // namespace
 
@@ -231,48 +299,16 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
                              ", with topic names as in the recording");
   }
 
-  RecordingReadOptions again = options.read;
-  again.check_data = options.read.salvage;  // It was just now, but what is salvaged has its loss told.
-  PRESCENE_TRY(const auto reader, RecordingReader::open(path, again));
   BusReplayResult result;
-  const auto start = steady_clock::now();
-  core::TimeNs last_stamp_ns = 0;
-  double at = 0.0;
-  std::size_t asked = 0;
-  std::uint64_t entries = 0;
-  const double total = static_cast<double>(reader->message_count().value_or(0));
-  while (!cancellation.requested()) {
-    PRESCENE_TRY(const auto entry, reader->next());
-    if (!entry) break;
-    at = reader->seconds_into(*entry);
-    // What is needed from before goes first.
-    const double after = std::max(0.0, at - options.read.from);
-    listener.wait_until(start + seconds(after / options.speed), cancellation);
-    if (cancellation.requested()) break;
-    for (; asked < options.questions.size() && options.questions[asked].at <= at; ++asked)
-      PRESCENE_RETURN_IF_ERROR(player.ask(asked, options.questions[asked].at, options.questions[asked]));
-    if (on_entry) on_entry(*entry);
-    if (progress && total > 0.0) progress({static_cast<double>(++entries) / total, {}, ""});
-    if (!is_robots(*entry)) continue;
-    PRESCENE_TRY(const auto publisher, publisher_for(entry->message, player, passed_over));
-    if (!publisher) continue;
-    const core::Status published = node->publish_cdr(*publisher, entry->message.cdr);
-    if (!published.ok()) core::log(log, core::LogLevel::kWarning, entry->message.topic + ": " + published.message());
-    last_stamp_ns = std::max(last_stamp_ns, is_image_type(entry->message.type) ? entry->message.source_ns : 0);
-    ++result.messages;
-  }
-  for (; asked < options.questions.size() && !cancellation.requested(); ++asked) {
-    core::log(log, core::LogLevel::kWarning,
-              "the recording ends at " + core::fixed_text(at, 2) + " s, before the question for " +
-                  core::fixed_text(options.questions[asked].at, 2) + " s: it is asked now");
-    PRESCENE_RETURN_IF_ERROR(player.ask(asked, at, options.questions[asked]));
-  }
-  listener.wait_for_rest(last_stamp_ns, steady_clock::now() + seconds(options.wait_at_end), cancellation);
+  const std::function<void(const RecordedEntry&)> none;
+  do {
+    listener.forget_beliefs();
+    // What is recorded is the same each time.
+    Round round{options, cancellation, progress, log, result.rounds++ == 0 ? on_entry : none, *node, player, listener};
+    PRESCENE_RETURN_IF_ERROR(round.play(path, passed_over, result));
+  } while (options.loop && result.messages > 0 && !cancellation.requested());
   node->stop_receiving();
   listener.move_to(result);
-  result.loss = reader->loss_text();
-  result.missing = reader->missing_text();
-  result.unchecked = reader->unchecked_text();
   return result;
 }
 

@@ -9,8 +9,11 @@
 #include <functional>
 #include <future>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
+#include <vector>
 
+#include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/belief_summary.h"
 #include "prescene/service/live/bus_replay.h"
@@ -292,6 +295,52 @@ TEST_F(LiveServiceTest, AReplayStopsInAPauseAndWhileItWaitsForAService) {
   stopper.join();
   ASSERT_TRUE(result.ok()) << result.status().message();
   EXPECT_LT(entries, 10);
+}
+
+TEST_F(LiveServiceTest, ALoopPlaysTheSameStampsAgainUntilItIsStopped) {
+  const tests::ScratchDir folder;
+  const std::filesystem::path path = folder.path() / "run.mcap";
+  const core::Status recorded = tests::record_scene(tests::kBoxScene, {}, 10.0, path);
+  ASSERT_TRUE(recorded.ok()) << recorded.message();
+  BusReplayOptions options;
+  options.dds.domain = tests::own_domain();
+  options.wait_for_service = 0.0;
+  options.loop = true;
+
+  const core::Cancellation never;
+  core::Cancellation enough(never, core::Cancellation::Clock::now() + std::chrono::minutes(1));
+  const auto stamp_of = [](const interfaces::ReceivedMessage& message) -> core::TimeNs {
+    const auto image = interfaces::decode_cdr<interfaces::RosImage>(message.cdr);
+    return image ? interfaces::to_stamp_ns(image->header.stamp).value_or(-1) : -1;
+  };
+  std::vector<core::TimeNs> heard;  // of the node's thread, until it is stopped
+  int returns = 0;
+  const auto node = interfaces::DdsNode::create(options.dds, {});
+  ASSERT_TRUE(node.ok()) << node.status().message();
+  ASSERT_TRUE((*node)
+                  ->subscribe(InputTopics().depth, "sensor_msgs/msg/Image", interfaces::TopicQos::kReliable,
+                              [&](interfaces::ReceivedMessage&& message) {
+                                heard.push_back(stamp_of(message));
+                                if (heard.size() > 1 && heard.back() < heard[heard.size() - 2]) ++returns;
+                                if (returns == 3) enough.request();
+                              })
+                  .ok());
+  std::set<core::TimeNs> stamps;
+  std::uint64_t entries = 0;
+  const auto result = replay_over_bus(path, options, enough, {}, {}, [&](const RecordedEntry& entry) {
+    ++entries;
+    if (entry.message.topic == InputTopics().depth) stamps.insert(stamp_of(entry.message));
+  });
+  (*node)->stop_receiving();
+  ASSERT_TRUE(result.ok()) << result.status().message();
+  EXPECT_GE(returns, 3);
+  EXPECT_GE(result->rounds, 4u);
+  EXPECT_GT(result->messages, 3 * stamps.size());
+  EXPECT_GE(stamps.size(), 3u) << "of " << entries;
+  for (const core::TimeNs stamp_ns : heard) EXPECT_TRUE(stamps.contains(stamp_ns)) << stamp_ns;
+
+  options.questions = {{0.0, R"({"where": {}})"}};
+  EXPECT_EQ(replay_over_bus(path, options, enough, {}, {}).status().code(), core::StatusCode::kInvalidInput);
 }
 
 TEST_F(LiveServiceTest, RefusesWhatMakesNoSenseAndGoesOn) {

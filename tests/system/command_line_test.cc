@@ -440,6 +440,9 @@ TEST(CommandLine, OptionsThatMakeNoSenseAreRefused) {
   const std::pair<std::vector<std::string>, std::string> all[] = {
       {{"replay", scene, "--speed", "2"}, "--over-dds"},
       {{"replay", scene, "--ask", "1:{}"}, "--over-dds"},
+      {{"replay", scene, "--loop"}, "--over-dds"},
+      {{"replay", scene, "--over-dds", "--loop", "--ask", "1:{}"}, "--ask"},
+      {{"replay", scene, "--over-dds", "--loop", "--report", "page.html"}, "--loop"},
       {{"replay", scene, "--over-dds", "--speed", "1e-300"}, "between 0.001 and 10000"},
       {{"replay", scene, "--over-dds", "--speed", "1e300"}, "between 0.001 and 10000"},
       {{"replay", scene, "--over-dds", "--ask", "1:garbage"}, "--ask SECONDS:JSON"},

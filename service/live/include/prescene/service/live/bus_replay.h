@@ -30,12 +30,16 @@ struct BusReplayOptions {
   double wait_for_service = 20.0;  ///< s to wait for a service to listen before the first message; 0 = don't.
   double wait_at_end = 2.0;        ///< s to wait for the last beliefs; answers get their seconds_to_wait().
   std::vector<TimedQuestion> questions;
+  /// Plays it again from the start, with the same stamps, until it is cancelled; at once, not waiting for the last
+  /// beliefs. A recording without a message of the robot is played once. `questions` has to be empty.
+  bool loop = false;
   RecordingReadOptions read;
 };
 
 struct BusReplayResult {
   std::uint64_t messages = 0;          ///< Published.
-  std::vector<BeliefSummary> beliefs;  ///< As published by the service, in order of arrival.
+  std::uint64_t rounds = 0;            ///< How often its playing was begun: 1 without `loop`.
+  std::vector<BeliefSummary> beliefs;  ///< As published by the service in the last round, in order of arrival.
   struct Answered {
     double at = 0.0;  ///< s into the recording when it was asked
     std::string question;
@@ -48,10 +52,10 @@ struct BusReplayResult {
   std::string unchecked;  ///< The same.
 };
 
-/// `on_entry` sees each entry of the recording when its time has come. A request to cancel ends it within 0.1 s, also
-/// in a pause of the recording; what was done is returned. Before anything is published it fails with kCancelled then,
-/// with kInvalidInput for a speed out of range or a question that is none, and with kUnavailable when no service
-/// listens in time.
+/// `on_entry` sees each entry of the recording when its time has come, in the first round only. A request to cancel
+/// ends it within 0.1 s, also in a pause of the recording; what was done is returned. Before anything is published it
+/// fails with kCancelled then, with kInvalidInput for a speed out of range or a question that is none, and with
+/// kUnavailable when no service listens in time.
 core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path, const BusReplayOptions& options,
                                               const core::Cancellation& cancellation,
                                               const core::ProgressSink& progress, const core::LogSink& log,
