@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
+#include <map>
 #include <system_error>
 #include <utility>
 
@@ -97,33 +98,40 @@ Result<BagMetadata> read_bag_metadata(const std::filesystem::path& folder) {
 }
 
 Result<BagMetadata> bag_without_metadata(const std::filesystem::path& folder) {
-  std::vector<std::pair<std::uint64_t, std::filesystem::path>> numbered;
-  std::vector<std::filesystem::path> others;
-  std::string stem;
+  struct Run {
+    std::vector<std::pair<std::uint64_t, std::filesystem::path>> files;
+    std::string continued_as;  ///< The run of what goes on from its only file.
+  };
+  std::map<std::string, Run> runs;  // by what the names of its files have in common
+  std::size_t count = 0;
   std::error_code error;
   for (std::filesystem::directory_iterator file(folder, error), end; !error && file != end; file.increment(error)) {
     if (!is_bag_file(file->path()) || !file->is_regular_file(error)) continue;
-    std::string its_stem;
-    const auto number = number_of(file->path(), &its_stem);
-    if (number && (stem.empty() || stem == its_stem)) {
-      numbered.emplace_back(*number, file->path());
-      stem = its_stem;
-    } else {
-      others.push_back(file->path());
-    }
-    if (numbered.size() + others.size() > kMostBagFiles)
+    std::string stem;
+    const std::string name = file->path().filename().string();
+    const auto number = number_of(file->path(), &stem);
+    Run& run = runs[number ? stem : "/" + name];  // no name holds a slash
+    run.files.emplace_back(number.value_or(0), file->path());
+    run.continued_as = run.files.size() == 1 && number == 0U ? name : "";
+    if (++count > kMostBagFiles)
       return core::resource_exhausted(folder.string() + ": has more than " + std::to_string(kMostBagFiles) + " files");
   }
   if (error) return core::unavailable(folder.string() + ": " + error.message());
-  if (numbered.size() + others.size() == 0)
+  if (runs.empty())
     return core::invalid_input(folder.string() + ": holds no .mcap or .db3 file; give the folder of a bag");
-  if (others.size() > 1 || (others.size() == 1 && !numbered.empty()))
+  std::vector<const Run*> in_order;
+  for (auto& [name, run] : runs) {
+    std::sort(run.files.begin(), run.files.end());
+    const bool goes_on = runs.size() == 2 && runs.contains(run.continued_as);
+    in_order.insert(goes_on ? in_order.begin() : in_order.end(), &run);
+  }
+  const bool is_one = in_order.size() == 1 || (in_order.size() == 2 && runs.contains(in_order.front()->continued_as));
+  if (!is_one)
     return core::invalid_input(folder.string() +
                                ": has no metadata.yaml and files of different recordings; name one of them");
-  std::sort(numbered.begin(), numbered.end());
   BagMetadata out;
-  for (auto& [number, path] : numbered) out.files.push_back(std::move(path));
-  if (numbered.empty()) out.files = std::move(others);
+  for (const Run* run : in_order)
+    for (const auto& [number, path] : run->files) out.files.push_back(path);
   return out;
 }
 

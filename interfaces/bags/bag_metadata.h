@@ -24,7 +24,7 @@ struct BagMetadata {
 core::Result<BagMetadata> read_bag_metadata(const std::filesystem::path& folder);
 
 /// Of a folder without metadata, as a recorder leaves it that was killed: its .mcap or .db3 files in the order of the
-/// numbers in their names.
+/// numbers in their names ("run_0", "run_1", ... of rosbag2; "run_0", "run_0_0001", ... of ours).
 core::Result<BagMetadata> bag_without_metadata(const std::filesystem::path& folder);
 
 inline constexpr const char* kBagMetadataName = "metadata.yaml";

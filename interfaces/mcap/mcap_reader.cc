@@ -396,6 +396,17 @@ Result<McapAttachment> McapReader::attachment(const std::string& name, std::size
                         saturated(found->head.create_time)};
 }
 
+std::optional<McapReader::Statistics> McapReader::statistics() const {
+  const auto& said = impl_->layout.statistics;
+  if (!said) return std::nullopt;
+  Statistics statistics{saturated(said->start_time), saturated(said->end_time), said->message_count,
+                        std::vector<std::uint64_t>(impl_->channels.size())};
+  for (const auto& [id, count] : said->channel_message_counts)
+    if (const auto channel = impl_->channel_of_id.find(id); channel != impl_->channel_of_id.end())
+      statistics.by_channel[static_cast<std::size_t>(channel->second)] += count;
+  return statistics;
+}
+
 std::optional<std::uint64_t> McapReader::message_count() const {
   if (!impl_->layout.statistics) return std::nullopt;
   return impl_->layout.statistics->message_count;

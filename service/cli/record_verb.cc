@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
+#include "prescene/interfaces/bags/bag_writer.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/live/bus_recorder.h"
 #include "prescene/service/load_scene.h"
@@ -53,6 +54,39 @@ core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene
   return simulated.ok() ? labelled : simulated;
 }
 
+/// The folder that `-o FOLDER/` names, while a simulation is recorded to its file. What is not finished goes.
+class NewBag {
+ public:
+  /// Names the file in the options.
+  static core::Result<std::unique_ptr<NewBag>> create(RecordOptions& options) {
+    const std::filesystem::path folder = folder_of_bag(options.output);
+    std::error_code error;
+    const bool is_new = std::filesystem::create_directory(folder, error);
+    if (error) return core::unavailable("-o " + options.output + ": can't be made: " + error.message());
+    if (!is_new)
+      return core::invalid_input("-o " + options.output + ": is there already; remove it, or name another folder");
+    options.output = first_file_of_bag(folder).string();
+    return std::make_unique<NewBag>(options.output, options.simulation.topics.tf_static);
+  }
+  NewBag(std::filesystem::path file, std::string tf_static)
+      : file_(std::move(file)), tf_static_(std::move(tf_static)) {}
+  NewBag(const NewBag&) = delete;
+  NewBag& operator=(const NewBag&) = delete;
+  ~NewBag() {
+    std::error_code error;
+    if (!is_finished_) std::filesystem::remove(file_.parent_path(), error);  // only if nothing is in it
+  }
+  core::Status finish() {
+    is_finished_ = true;
+    return interfaces::write_bag_metadata(file_.parent_path(), {file_}, {tf_static_});
+  }
+
+ private:
+  std::filesystem::path file_;
+  std::string tf_static_;
+  bool is_finished_ = false;
+};
+
 core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   for (const char* name : kDomainOptions)
     if (options.verb->count(name) > 0)
@@ -82,6 +116,10 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
       return core::invalid_input("--labels " + options.labels + ": is the recording's name; name a folder");
     PRESCENE_TRY(labels, BopDataset::create(options.labels, *scene, *renderer));
   }
+  std::unique_ptr<NewBag> bag;
+  if (names_bag(options.output)) {
+    PRESCENE_TRY(bag, NewBag::create(options));
+  }
   // An older recording of that name stays until this one is whole. Where there is none, what is done is kept.
   std::error_code error;
   const bool replaces = std::filesystem::exists(options.output, error);
@@ -95,6 +133,10 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   if (keeps && error) status = core::unavailable(options.output + ": cannot be replaced: " + error.message());
   if (!keeps || error) std::filesystem::remove(aside, error);
   if (cancelled && replaces) return core::cancelled("stopped on request; " + options.output + " is as it was");
+  if (keeps && bag) {
+    const core::Status written = bag->finish();
+    if (status.ok()) status = written;
+  }
   if (!status.ok()) return with_name(status, aside, options.output);
   nlohmann::ordered_json document = {{"recording", options.output}, {"scene", scene->name}, {"simulated", true}};
   std::string said = "recorded " + options.output + "\n";
@@ -109,6 +151,7 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
 core::Status record_bus(RecordOptions& options, VerbContext& context) {
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
   PRESCENE_RETURN_IF_ERROR(check_recording("-o", options.output, {options.scene}));
+  PRESCENE_RETURN_IF_ERROR(check_part_limits(options.output, options.parts));
   const std::string output = live_recording_path(options.output, context);
   // With the names of the topics, so that a replay knows them.
   RecordingInfo info{"", "", context.options().seed, belief::json_text(to_json(options.tracker))};
@@ -123,11 +166,12 @@ core::Status record_bus(RecordOptions& options, VerbContext& context) {
     info.scene_file = options.scene;
     info.files = std::move(files);
   }
-  PRESCENE_TRY(const auto recording,
-               RollingRecording::create(
-                   output, std::move(info),
-                   {.part = options.parts, .tf_static = cameras.front().topics.tf_static, .asked = options.output},
-                   context.log()));
+  PRESCENE_TRY(const auto recording, RollingRecording::create(output, std::move(info),
+                                                              {.part = options.parts,
+                                                               .tf_static = cameras.front().topics.tf_static,
+                                                               .asked = options.output,
+                                                               .as_bag = names_bag(options.output)},
+                                                              context.log()));
   PRESCENE_TRY(const std::uint64_t messages,
                record_topics(options.dds, cameras, context.cancellation(), context.log(), *recording));
   context.print({{"recording", output}, {"messages", messages}, {"simulated", false}},
@@ -140,7 +184,10 @@ core::Status record_bus(RecordOptions& options, VerbContext& context) {
 Verb add_record_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("record", "Record the robot's topics, or a scene as a simulated robot would see it");
   auto options = std::make_shared<RecordOptions>();
-  verb->add_option("-o,--output", options->output, "Recording to write (MCAP)")->check(file_name())->required();
+  verb->add_option("-o,--output", options->output,
+                   "Recording to write (MCAP); with a slash at its end, a folder as of `ros2 bag record`")
+      ->check(file_name())
+      ->required();
   verb->add_option("--simulate", options->simulate,
                    "Scene file to play with a simulated RGB-D camera, instead of listening")
       ->check(file_name());

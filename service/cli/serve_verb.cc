@@ -61,6 +61,7 @@ core::Status run(ServeOptions& options, VerbContext& context) {
     PRESCENE_TRY(options.settings.tracker.filter.learned, load_proposals(options.proposals, *scene));
   }
   PRESCENE_RETURN_IF_ERROR(check_recording("--record", options.record, {options.scene}));
+  PRESCENE_RETURN_IF_ERROR(check_part_limits(options.record, options.parts));
   PRESCENE_RETURN_IF_ERROR(check_apart("--learned", options.learned, "--record", options.record));
   PRESCENE_RETURN_IF_ERROR(take_learned(options.learned, {options.scene}, options.settings.tracker));
   options.settings.learned_file = options.learned;
@@ -68,12 +69,14 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   if (!options.record.empty()) {
     const std::string asked = std::exchange(options.record, live_recording_path(options.record, context));
     PRESCENE_TRY(recording,
-                 RollingRecording::create(
-                     options.record,
-                     {options.scene, text, context.options().seed, belief::json_text(to_json(options.settings.tracker)),
-                      std::move(files)},
-                     {.part = options.parts, .tf_static = options.settings.tracker.topics.tf_static, .asked = asked},
-                     context.log()));
+                 RollingRecording::create(options.record,
+                                          {options.scene, text, context.options().seed,
+                                           belief::json_text(to_json(options.settings.tracker)), std::move(files)},
+                                          {.part = options.parts,
+                                           .tf_static = options.settings.tracker.topics.tf_static,
+                                           .asked = asked,
+                                           .as_bag = names_bag(asked)},
+                                          context.log()));
   }
   const auto started_with = [&options](const char* name, ParameterValue value, const char* description) {
     options.settings.started_with.push_back({name, description, std::move(value)});

@@ -258,7 +258,34 @@ CLI::Validator file_name() {
           "", "file name"};
 }
 
+bool names_bag(const std::string& output) { return output.size() > 1 && output.ends_with('/'); }
+
+std::filesystem::path folder_of_bag(const std::string& output) {
+  const std::filesystem::path path = std::filesystem::path(output).lexically_normal();
+  return path.has_filename() ? path : path.parent_path();
+}
+
+std::filesystem::path first_file_of_bag(const std::filesystem::path& folder) {
+  return folder / (folder.filename().string() + "_0.mcap");
+}
+
+core::Status check_part_limits(const std::string& output, const PartLimits& limits) {
+  if (!names_bag(output) || limits.keep_bytes == 0) return core::ok_status();
+  return core::invalid_input("--keep-megabytes bounds files beside each other, and " + output +
+                             " is a folder of its own: name a file (without the slash)");
+}
+
 std::string live_recording_path(const std::string& asked, VerbContext& context) {
+  if (names_bag(asked)) {
+    const std::filesystem::path folder = folder_of_bag(asked);
+    std::filesystem::path unused = folder;
+    std::error_code none;
+    for (int i = 2; std::filesystem::exists(std::filesystem::symlink_status(unused, none)); ++i)
+      unused.replace_filename(folder.filename().string() + "-" + std::to_string(i));
+    if (unused != folder)
+      core::log(context.log(), core::LogLevel::kWarning, asked + " exists: recording to " + unused.string() + "/");
+    return first_file_of_bag(unused).string();
+  }
   std::string unused = unused_recording_path(asked).string();
   if (unused != asked) core::log(context.log(), core::LogLevel::kWarning, asked + " exists: recording to " + unused);
   return unused;
@@ -326,6 +353,18 @@ core::Status check_recording(const std::string& option, const std::string& outpu
                              const std::vector<std::string>& inputs) {
   if (output.empty()) return core::ok_status();
   std::error_code none;
+  if (names_bag(output)) {
+    const std::filesystem::path bag = folder_of_bag(output);
+    const std::string name = bag.filename().string();
+    if (name.empty() || name == "." || name == "..")
+      return core::invalid_input(option + " " + output + ": names no new folder; a bag has one of its own");
+    if (std::filesystem::exists(bag, none) && !std::filesystem::is_directory(bag, none))
+      return core::invalid_input(option + " " + output + ": is no folder; name another, or a file (without the slash)");
+    const std::filesystem::path above = bag.parent_path();
+    if (!above.empty() && !std::filesystem::is_directory(above, none))
+      return core::unavailable(option + " " + output + ": there is no folder " + above.string() + "; make it first");
+    return core::ok_status();
+  }
   const std::filesystem::path place = std::filesystem::absolute(output, none).lexically_normal();
   const std::filesystem::path folder = std::filesystem::weakly_canonical(place.parent_path(), none);
   const bool is_other = std::filesystem::exists(output, none) && !std::filesystem::is_regular_file(output, none);

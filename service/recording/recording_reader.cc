@@ -17,10 +17,29 @@ namespace {
 
 void add_sentence(std::string& text, const std::string& sentence) { text += (text.empty() ? "" : "; ") + sentence; }
 
+/// The first file of a bag of several that we recorded: what each says of itself, a BagReader passes over. Nothing
+/// where the path is none, or it can't be read as one.
+std::optional<std::filesystem::path> first_of_own_bag(const std::filesystem::path& path) {
+  std::error_code none;
+  if (!std::filesystem::is_directory(path, none)) return std::nullopt;
+  const auto bag = interfaces::BagReader::open(path, {.salvage = true, .check_data = false});
+  if (!bag || (*bag)->files().size() < 2) return std::nullopt;
+  const std::filesystem::path first = (*bag)->files().front();
+  const auto part = part_of(first);
+  if (!part || part->series.empty() || part->number != 0) return std::nullopt;
+  return first;
+}
+
 }  // namespace
 
 core::Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const std::filesystem::path& path,
                                                                      const RecordingReadOptions& options) {
+  const std::optional<std::filesystem::path> first = first_of_own_bag(path);
+  if (first) {
+    RecordingReadOptions all = options;
+    all.all_parts = true;
+    return open(*first, all);
+  }
   std::unique_ptr<RecordingReader> reader(new RecordingReader(options));
   PRESCENE_RETURN_IF_ERROR(reader->open_file(path));
   if (options.all_parts)

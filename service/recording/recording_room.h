@@ -40,6 +40,30 @@ class NewFile {
   bool is_mine_ = false;
 };
 
+/// A folder that was not there, for a bag. It goes again, if it is empty, unless it is kept.
+class NewBagFolder {
+ public:
+  static core::Result<std::unique_ptr<NewBagFolder>> create(const std::filesystem::path& path) {
+    std::error_code error;
+    const bool is_mine = std::filesystem::create_directory(path, error);
+    if (error) return core::unavailable(path.string() + ": the folder can't be made: " + error.message());
+    if (!is_mine) return core::unavailable(path.string() + ": is there already, and is not written over");
+    return std::make_unique<NewBagFolder>(path);
+  }
+  explicit NewBagFolder(std::filesystem::path path) : path_(std::move(path)) {}
+  NewBagFolder(const NewBagFolder&) = delete;
+  NewBagFolder& operator=(const NewBagFolder&) = delete;
+  ~NewBagFolder() {
+    std::error_code error;
+    if (is_mine_) std::filesystem::remove(path_, error);
+  }
+  void keep() { is_mine_ = false; }
+
+ private:
+  std::filesystem::path path_;
+  bool is_mine_ = true;
+};
+
 /// A file that was to go, and why it could not; "" = it is gone.
 struct RemovedFile {
   std::filesystem::path file;

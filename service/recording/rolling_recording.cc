@@ -11,6 +11,7 @@
 #include "no_memory.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/hash.h"
+#include "prescene/interfaces/bags/bag_writer.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "recording_room.h"
 
@@ -35,6 +36,10 @@ core::Result<std::unique_ptr<RollingRecording>> RollingRecording::create(const s
     info.part.bounded_as = (options.asked.empty() ? path : options.asked).filename().string();
     info.part.first_file = path.filename().string();
   }
+  std::unique_ptr<NewBagFolder> folder;
+  if (options.as_bag) {
+    PRESCENE_TRY(folder, NewBagFolder::create(path.parent_path()));
+  }
   PRESCENE_TRY(const auto file, NewFile::create(path));
   PRESCENE_TRY(auto writer, RecordingWriter::create(path, info, options.safety));
   std::unique_ptr<RollingRecording> recording(new RollingRecording(path, std::move(info), options, std::move(log)));
@@ -46,6 +51,7 @@ core::Result<std::unique_ptr<RollingRecording>> RollingRecording::create(const s
     return core::unavailable(std::string("no thread can be started for the recording: ") + error.what());
   }
   file->keep();
+  if (folder) folder->keep();
   recording->remove_oldest();
   return recording;
 }
@@ -209,7 +215,19 @@ core::Status RollingRecording::close() {
     writer_.reset();
     if (failed_.ok()) failed_ = closed;
   }
+  if (std::exchange(options_.as_bag, false)) {
+    const core::Status written = result_of<core::Status>([this] { return write_bag_metadata(); });
+    if (failed_.ok()) failed_ = written;
+  }
   return failed_;
+}
+
+core::Status RollingRecording::write_bag_metadata() const {
+  std::vector<std::filesystem::path> files;
+  std::error_code error;
+  for (const std::filesystem::path& file : kept_)
+    if (std::filesystem::exists(file, error)) files.push_back(file);
+  return interfaces::write_bag_metadata(first_.parent_path(), files, {options_.tf_static});
 }
 
 }  // namespace prescene::service

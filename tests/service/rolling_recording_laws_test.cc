@@ -14,6 +14,7 @@
 
 #include "prescene/belief/json.h"
 #include "prescene/core/random.h"
+#include "prescene/interfaces/bags/bag_reader.h"
 #include "prescene/interfaces/mcap/mcap_reader.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/messages.h"
@@ -211,6 +212,39 @@ TEST_F(RollingRecordingLaws, AllFilesTogetherHoldEachMessageOnce) {
     }
   }
   EXPECT_EQ(robots, messages_.size());
+}
+
+TEST_F(RollingRecordingLaws, ABagIsReplayedAsAWholeWithAndWithoutItsMetadata) {
+  const path bag = file("bag");
+  {
+    auto recording = RollingRecording::create(bag / "bag_0.mcap", {"scene.yaml", scene_text_, 1, "", FilesOfScene{}},
+                                              {.as_bag = true});
+    ASSERT_TRUE(recording.ok()) << recording.status().message();
+    const auto changes = random_changes(messages_.size(), 3, 7);
+    serve(**recording, [&](std::size_t number, Tracker& tracks) {
+      if (!changes.contains(number)) return;
+      (*recording)->ask_for_change();
+      go_on_in_next_file(**recording, tracks);
+    });
+    // As long as it goes on, and where it is killed, there are none.
+    EXPECT_FALSE(std::filesystem::exists(bag / "metadata.yaml"));
+    EXPECT_TRUE((*recording)->close().ok());
+  }
+  const auto as_others_read_it = interfaces::BagReader::open(bag);
+  ASSERT_TRUE(as_others_read_it.ok()) << as_others_read_it.status().message();
+  EXPECT_EQ((*as_others_read_it)->files().size(), 4u);
+  std::uint64_t messages = 0;
+  for (auto message = (*as_others_read_it)->next(); message.ok() && *message; message = (*as_others_read_it)->next())
+    ++messages;
+  EXPECT_EQ((*as_others_read_it)->message_count(), messages);
+  const ReplaySummary whole = replayed(bag, false);
+  EXPECT_EQ(whole.compared, steps_.size());
+  EXPECT_EQ(whole.loss, "");
+  std::filesystem::remove(bag / "metadata.yaml");
+  EXPECT_EQ(replayed(bag, false).compared, steps_.size());
+  // A folder that is there is nobody's to write into.
+  EXPECT_EQ(RollingRecording::create(bag / "bag_0.mcap", {}, {.as_bag = true}).status().code(),
+            core::StatusCode::kUnavailable);
 }
 
 TEST_F(RollingRecordingLaws, CutAnywhereAFileReplaysToItsEndAndThoseBeforeItAreWhole) {

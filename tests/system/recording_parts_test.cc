@@ -2,6 +2,7 @@
 // A recording in several files, as a script replays it: the exit code says whether all of it was there.
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -55,6 +56,51 @@ TEST(RecordingParts, ReplayEndsWithTwoWhereAFileIsMissing) {
   EXPECT_GT(rest.value("messages", 0), 30) << "what is there is played all the same";
   EXPECT_EQ(replay({"--all-parts", "--salvage"}).first, 0) << "what is there was asked for";
   EXPECT_EQ(replay({}).first, 0) << "the first file alone was asked for";
+}
+
+TEST(RecordingParts, ASlashAtTheEndMakesABag) {
+  const ScratchDir folder;
+  const auto path = [&folder](const std::string& name) { return (folder.path() / name).string(); };
+  write_file(path("box.yaml"), box_on_table("0.5"));
+  const auto record = [&](const std::string& output) {
+    return run_program({"record", "--simulate", path("box.yaml"), "-o", output, "--rate", "8", "--json"});
+  };
+  const auto steps_of = [&](const std::string& recording) {
+    const Finished replayed = run_program({"replay", recording, "--json"});
+    EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
+    auto steps = nlohmann::json::parse(replayed.out, nullptr, false)["steps"];
+    for (auto& step : steps) step.erase("seconds");
+    return steps;
+  };
+  EXPECT_EQ(record(path("run.mcap")).exit_code, 0);
+  const Finished recorded = record(path("bag/"));
+  EXPECT_EQ(recorded.exit_code, 0) << recorded.err;
+  EXPECT_EQ(nlohmann::json::parse(recorded.out)["recording"], path("bag/bag_0.mcap"));
+  EXPECT_TRUE(std::filesystem::exists(path("bag/metadata.yaml")));
+  EXPECT_EQ(read_file(path("bag/bag_0.mcap")), read_file(path("run.mcap")));
+  EXPECT_EQ(steps_of(path("bag")), steps_of(path("run.mcap")));
+  EXPECT_GT(steps_of(path("bag")).size(), 2u);
+
+  const Finished again = record(path("bag/"));
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_NE(again.err.find("is there already"), std::string::npos) << again.err;
+  EXPECT_EQ(record(path("run.mcap/")).exit_code, 2);
+  EXPECT_EQ(record(path("none/bag/")).exit_code, 1);
+  const Finished bounded = run_program({"record", "-o", path("live/"), "--keep-megabytes", "50"}, {own_bus()});
+  EXPECT_EQ(bounded.exit_code, 2);
+  EXPECT_NE(bounded.err.find("--keep-megabytes"), std::string::npos) << bounded.err;
+}
+
+// As `ros2 bag record`, but for a folder that is there: what a robot saw is not written over, nor refused.
+TEST(RecordingParts, ALiveBagIsClosedByCtrlCAndTakesAnotherNameWhereItsOwnIsTaken) {
+  const ScratchDir folder;
+  std::filesystem::create_directory(folder.path() / "bag");
+  BackgroundProgram recorder({"record", "-o", (folder.path() / "bag/").string()}, {own_bus()});
+  const std::filesystem::path bag = folder.path() / "bag-2";
+  while (!std::filesystem::exists(bag / "bag-2_0.mcap") && !recorder.has_ended()) std::this_thread::yield();
+  EXPECT_EQ(recorder.stop(SIGINT), 0);
+  EXPECT_TRUE(std::filesystem::exists(bag / "metadata.yaml"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path() / "bag"));
 }
 
 }  // namespace

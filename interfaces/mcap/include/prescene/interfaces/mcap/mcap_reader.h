@@ -100,6 +100,13 @@ class McapReader {
   core::Result<McapAttachment> attachment(const std::string& name,
                                           std::size_t max_bytes = std::size_t{256} << 20) const;
 
+  /// What the file says of its messages; nothing where it has no statistics, as one that was cut.
+  struct Statistics {
+    std::int64_t first_ns = 0, last_ns = 0;  ///< Earliest and latest log time; 0 without messages.
+    std::uint64_t messages = 0;
+    std::vector<std::uint64_t> by_channel;  ///< As channels().
+  };
+  std::optional<Statistics> statistics() const;
   /// Messages in the file if it has statistics.
   std::optional<std::uint64_t> message_count() const;
 

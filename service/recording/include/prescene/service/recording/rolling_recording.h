@@ -63,6 +63,9 @@ struct RollingOptions {
   std::string tf_static = InputTopics{}.tf_static;
   /// The name that was asked for, where unused_recording_path() gave another; "" = it did not.
   std::filesystem::path asked = {};
+  /// The file is in a new folder, which becomes a bag of rosbag2: create() makes it, and close() writes its
+  /// metadata.yaml.
+  bool as_bag = false;
 };
 
 /// How a recording is.
@@ -88,7 +91,8 @@ struct RollingState {
 /// written is not in the recording, which goes on, in a new file if need be. Its own thread throws nothing.
 class RollingRecording {
  public:
-  /// Begins the first file; errors of RecordingWriter::create. `info.part` is not looked at.
+  /// Begins the first file; errors of RecordingWriter::create. `info.part` is not looked at. kUnavailable where the
+  /// folder of `as_bag` is there already or can't be made.
   static core::Result<std::unique_ptr<RollingRecording>> create(const std::filesystem::path& path, RecordingInfo info,
                                                                 const RollingOptions& options = {},
                                                                 core::LogSink log = {});
@@ -126,6 +130,7 @@ class RollingRecording {
   core::Status close();
 
  private:
+  core::Status write_bag_metadata() const;
   struct Ready {
     std::unique_ptr<RecordingWriter> writer;
     std::filesystem::path path;
