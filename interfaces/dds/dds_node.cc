@@ -361,6 +361,9 @@ core::Status DdsNode::publish(DdsPublisher publisher, const RosPoseWithCovarianc
   return impl_->write<geometry_msgs_msg_dds__PoseWithCovarianceStamped_>(
       publisher, "geometry_msgs/msg/PoseWithCovarianceStamped", message);
 }
+core::Status DdsNode::publish(DdsPublisher publisher, const RosPoseArray& message) {
+  return impl_->write<geometry_msgs_msg_dds__PoseArray_>(publisher, "geometry_msgs/msg/PoseArray", message);
+}
 core::Status DdsNode::publish(DdsPublisher publisher, const RosDetection3dArray& message) {
   return impl_->write<vision_msgs_msg_dds__Detection3DArray_>(publisher, "vision_msgs/msg/Detection3DArray", message);
 }
@@ -375,6 +378,10 @@ core::Status DdsNode::publish(DdsPublisher publisher, const RosDiagnosticArray& 
 
 core::Status DdsNode::publish(DdsPublisher publisher, const RosParameterEvent& message) {
   return impl_->write<rcl_interfaces_msg_dds__ParameterEvent_>(publisher, "rcl_interfaces/msg/ParameterEvent", message);
+}
+
+core::Status DdsNode::publish(DdsPublisher publisher, const RosCollisionObject& message) {
+  return impl_->write<moveit_msgs_msg_dds__CollisionObject_>(publisher, "moveit_msgs/msg/CollisionObject", message);
 }
 
 core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr) {
@@ -396,8 +403,10 @@ core::Status DdsNode::publish_cdr(DdsPublisher publisher, const std::vector<std:
   if (type == "std_msgs/msg/String") return decoded(RosString{});
   if (type == "rosgraph_msgs/msg/Clock") return decoded(RosClock{});
   if (type == "geometry_msgs/msg/PoseWithCovarianceStamped") return decoded(RosPoseWithCovarianceStamped{});
+  if (type == "geometry_msgs/msg/PoseArray") return decoded(RosPoseArray{});
   if (type == "vision_msgs/msg/Detection3DArray") return decoded(RosDetection3dArray{});
   if (type == "visualization_msgs/msg/MarkerArray") return decoded(RosMarkerArray{});
+  if (type == "moveit_msgs/msg/CollisionObject") return decoded(RosCollisionObject{});
   if (type == "diagnostic_msgs/msg/DiagnosticArray") return decoded(RosDiagnosticArray{});
   return core::unsupported("messages of type '" + type + "' can't be published from recordings");
 }

@@ -13,6 +13,7 @@
 
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/parameter_messages.h"
+#include "prescene/interfaces/ros_messages/planning_messages.h"
 #include "ros_messages.h"
 
 namespace prescene::interfaces {
@@ -54,6 +55,7 @@ void fill(Sequence& to, const std::vector<T>& from, SampleArena& arena);
 #define PRESCENE_FILL_9(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_8(__VA_ARGS__)
 #define PRESCENE_FILL_10(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_9(__VA_ARGS__)
 #define PRESCENE_FILL_11(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_10(__VA_ARGS__)
+#define PRESCENE_FILL_13(a, b, ...) PRESCENE_FILL_2(a, b) PRESCENE_FILL_11(__VA_ARGS__)
 #define PRESCENE_FILL_19(a, b, c, d, e, f, g, h, ...) \
   PRESCENE_FILL_8(a, b, c, d, e, f, g, h) PRESCENE_FILL_11(__VA_ARGS__)
 /// Fills every field of the C struct from the field of the same name.
@@ -72,6 +74,7 @@ PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__Quaternion_, RosQuaternion, 4, x, y,
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__Pose_, RosPose, 2, position, orientation)
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__PoseWithCovariance_, RosPoseWithCovariance, 2, pose, covariance)
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__PoseWithCovarianceStamped_, RosPoseWithCovarianceStamped, 2, header, pose)
+PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__PoseArray_, RosPoseArray, 2, header, poses)
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__Transform_, RosTransform, 2, translation, rotation)
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__TransformStamped_, RosTransformStamped, 3, header, child_frame_id,
                      transform)
@@ -114,6 +117,16 @@ PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__SetParametersResult_, RosSetParamet
 PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__ListParametersResult_, RosListParametersResult, 2, names, prefixes)
 PRESCENE_FILL_STRUCT(rcl_interfaces_msg_dds__ParameterEvent_, RosParameterEvent, 5, stamp, node, new_parameters,
                      changed_parameters, deleted_parameters)
+PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__Point32_, RosPoint32, 3, x, y, z)
+PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__Polygon_, RosPolygon, 1, points)
+PRESCENE_FILL_STRUCT(shape_msgs_msg_dds__SolidPrimitive_, RosSolidPrimitive, 3, type, dimensions, polygon)
+PRESCENE_FILL_STRUCT(shape_msgs_msg_dds__MeshTriangle_, RosMeshTriangle, 1, vertex_indices)
+PRESCENE_FILL_STRUCT(shape_msgs_msg_dds__Mesh_, RosMesh, 2, triangles, vertices)
+PRESCENE_FILL_STRUCT(shape_msgs_msg_dds__Plane_, RosPlane, 1, coef)
+PRESCENE_FILL_STRUCT(object_recognition_msgs_msg_dds__ObjectType_, RosObjectType, 2, key, db)
+PRESCENE_FILL_STRUCT(moveit_msgs_msg_dds__CollisionObject_, RosCollisionObject, 13, header, pose, id, type, primitives,
+                     primitive_poses, meshes, mesh_poses, planes, plane_poses, subframe_names, subframe_poses,
+                     operation)
 // Of replies, all but the client and the number of its request.
 PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__ListParameters_Response_, RosListParametersResponse, 1, result)
 PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__GetParameters_Response_, RosGetParametersResponse, 1, values)
@@ -126,6 +139,7 @@ PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__SetParametersAtomically_Response_, 
 
 #undef PRESCENE_FILL_STRUCT
 #undef PRESCENE_FILL_19
+#undef PRESCENE_FILL_13
 #undef PRESCENE_FILL_11
 #undef PRESCENE_FILL_10
 #undef PRESCENE_FILL_9

@@ -25,9 +25,11 @@ const dds_topic_descriptor_t* descriptor_of(const std::string& ros_type) {
       {"std_msgs/msg/String", &std_msgs_msg_dds__String__desc},
       {"rosgraph_msgs/msg/Clock", &rosgraph_msgs_msg_dds__Clock__desc},
       {"geometry_msgs/msg/PoseWithCovarianceStamped", &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc},
+      {"geometry_msgs/msg/PoseArray", &geometry_msgs_msg_dds__PoseArray__desc},
       {"vision_msgs/msg/Detection3DArray", &vision_msgs_msg_dds__Detection3DArray__desc},
       {"visualization_msgs/msg/MarkerArray", &visualization_msgs_msg_dds__MarkerArray__desc},
       {"diagnostic_msgs/msg/DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc},
+      {"moveit_msgs/msg/CollisionObject", &moveit_msgs_msg_dds__CollisionObject__desc},
       {"rcl_interfaces/msg/ParameterEvent", &rcl_interfaces_msg_dds__ParameterEvent__desc},
   };
   const auto* row = std::find_if(std::begin(kRows), std::end(kRows), [&](const Row& r) { return r.type == ros_type; });
@@ -141,6 +143,10 @@ QosPtr make_qos(TopicQos kind, const std::string& ros_type) {
       break;
     case TopicQos::kEvents:
       depth = 1000;
+      longest_wait = 0;
+      break;
+    case TopicQos::kChanges:
+      depth = 100;
       longest_wait = 0;
       break;
     case TopicQos::kCommands:

@@ -12,6 +12,7 @@
 #include "prescene/interfaces/ros_messages/image_view.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/parameter_messages.h"
+#include "prescene/interfaces/ros_messages/planning_messages.h"
 
 namespace prescene::interfaces::message_fields {
 
@@ -127,6 +128,20 @@ PRESCENE_FIELDS(RosSetParametersAtomicallyRequest, Field{"parameters", &M::param
 PRESCENE_FIELDS(RosSetParametersAtomicallyResponse, Field{"result", &M::result});
 PRESCENE_FIELDS(RosSetParametersRequest, Field{"parameters", &M::parameters});
 PRESCENE_FIELDS(RosSetParametersResponse, Field{"results", &M::results});
+PRESCENE_FIELDS(RosPoint32, Field{"x", &M::x}, Field{"y", &M::y}, Field{"z", &M::z});
+PRESCENE_FIELDS(RosPolygon, Field{"points", &M::points});
+PRESCENE_FIELDS(RosSolidPrimitive, Field{"type", &M::type}, Field{"dimensions", &M::dimensions},
+                Field{"polygon", &M::polygon});
+PRESCENE_FIELDS(RosMeshTriangle, Field{"vertex_indices", &M::vertex_indices});
+PRESCENE_FIELDS(RosMesh, Field{"triangles", &M::triangles}, Field{"vertices", &M::vertices});
+PRESCENE_FIELDS(RosPlane, Field{"coef", &M::coef});
+PRESCENE_FIELDS(RosObjectType, Field{"key", &M::key}, Field{"db", &M::db});
+PRESCENE_FIELDS(RosCollisionObject, Field{"header", &M::header}, Field{"pose", &M::pose}, Field{"id", &M::id},
+                Field{"type", &M::type}, Field{"primitives", &M::primitives},
+                Field{"primitive_poses", &M::primitive_poses}, Field{"meshes", &M::meshes},
+                Field{"mesh_poses", &M::mesh_poses}, Field{"planes", &M::planes}, Field{"plane_poses", &M::plane_poses},
+                Field{"subframe_names", &M::subframe_names}, Field{"subframe_poses", &M::subframe_poses},
+                Field{"operation", &M::operation});
 
 #undef PRESCENE_FIELDS
 
@@ -159,7 +174,7 @@ struct MinWireSize<std::array<T, n>> {
 
 }  // namespace prescene::interfaces::message_fields
 
-/// Every message of messages.h and parameter_messages.h, for explicit instantiation.
+/// Every message of messages.h, parameter_messages.h and planning_messages.h, for explicit instantiation.
 // clang-format off
 #define PRESCENE_FOR_EACH_MESSAGE(DO) \
   DO(RosTime) DO(RosDuration) DO(RosClock) DO(RosHeader) DO(RosString) DO(RosColorRgba) DO(RosVector3) \
@@ -174,5 +189,7 @@ struct MinWireSize<std::array<T, n>> {
   DO(RosDescribeParametersRequest) DO(RosDescribeParametersResponse) DO(RosGetParameterTypesRequest) \
   DO(RosGetParameterTypesResponse) DO(RosGetParametersRequest) DO(RosGetParametersResponse) \
   DO(RosListParametersRequest) DO(RosListParametersResponse) DO(RosSetParametersAtomicallyRequest) \
-  DO(RosSetParametersAtomicallyResponse) DO(RosSetParametersRequest) DO(RosSetParametersResponse)
+  DO(RosSetParametersAtomicallyResponse) DO(RosSetParametersRequest) DO(RosSetParametersResponse) \
+  DO(RosPoint32) DO(RosPolygon) DO(RosSolidPrimitive) DO(RosMeshTriangle) DO(RosMesh) DO(RosPlane) DO(RosObjectType) \
+  DO(RosCollisionObject)
 // clang-format on

@@ -7,11 +7,12 @@
 
 #include "prescene/core/check.h"
 #include "prescene/interfaces/ros_messages/messages.h"
+#include "prescene/interfaces/ros_messages/planning_messages.h"
 
 namespace prescene::interfaces {
 namespace {
 
-constexpr std::array<RosType, 58> kTypes = {{
+constexpr std::array<RosType, 66> kTypes = {{
     {"builtin_interfaces/msg/Duration", "builtin_interfaces::msg::dds_::Duration_",
      "RIHS01_e8d009f659816f758b75334ee1a9ca5b5c0b859843261f14c7f937349599d93b",
      "int32 sec\n"
@@ -40,6 +41,13 @@ constexpr std::array<RosType, 58> kTypes = {{
      "float64 x\n"
      "float64 y\n"
      "float64 z\n"},
+    {"geometry_msgs/msg/Point32", "geometry_msgs::msg::dds_::Point32_",
+     "RIHS01_2fc4db7cae16a4582c79a56b66173a8d48d52c7dc520ddc55a0d4bcf2a4bfdbc",
+     "float32 x\n"
+     "float32 y\n"
+     "float32 z\n"},
+    {"geometry_msgs/msg/Polygon", "geometry_msgs::msg::dds_::Polygon_",
+     "RIHS01_3782f9f0bf044964d692d6c017d705e37611afb1f0bf6a9dee248a7dda0f784a", "Point32[] points\n"},
     {"geometry_msgs/msg/Pose", "geometry_msgs::msg::dds_::Pose_",
      "RIHS01_d501954e9476cea2996984e812054b68026ae0bfae789d9a10b23daf35cc90fa",
      "Point position\n"
@@ -88,6 +96,25 @@ constexpr std::array<RosType, 58> kTypes = {{
      "float64 x\n"
      "float64 y\n"
      "float64 z\n"},
+    {"moveit_msgs/msg/CollisionObject", "moveit_msgs::msg::dds_::CollisionObject_",
+     "RIHS01_74b0acd6d56be032bf4f764b2c2633f50588b5fb2bd71e97206c59052747cf7e",
+     "std_msgs/Header header\n"
+     "geometry_msgs/Pose pose\n"
+     "string id\n"
+     "object_recognition_msgs/ObjectType type\n"
+     "shape_msgs/SolidPrimitive[] primitives\n"
+     "geometry_msgs/Pose[] primitive_poses\n"
+     "shape_msgs/Mesh[] meshes\n"
+     "geometry_msgs/Pose[] mesh_poses\n"
+     "shape_msgs/Plane[] planes\n"
+     "geometry_msgs/Pose[] plane_poses\n"
+     "string[] subframe_names\n"
+     "geometry_msgs/Pose[] subframe_poses\n"
+     "byte operation\n"},
+    {"object_recognition_msgs/msg/ObjectType", "object_recognition_msgs::msg::dds_::ObjectType_",
+     "RIHS01_5eb3ee3976403366d7c50d7dbee8bec96b3bced1e752674a7194a35841632134",
+     "string key\n"
+     "string db\n"},
     {"rcl_interfaces/msg/FloatingPointRange", "rcl_interfaces::msg::dds_::FloatingPointRange_",
      "RIHS01_e6af23a23c177fee5f3075c8b1e435162a9b63c863d78c06017460b49684262d",
      "float64 from_value\n"
@@ -227,6 +254,19 @@ constexpr std::array<RosType, 58> kTypes = {{
      "uint32 height\n"
      "uint32 width\n"
      "bool do_rectify\n"},
+    {"shape_msgs/msg/Mesh", "shape_msgs::msg::dds_::Mesh_",
+     "RIHS01_f2150b82d8ee7e8bc3f396a2b158aefb4b9a5510a474be271ba1268aebb55289",
+     "MeshTriangle[] triangles\n"
+     "geometry_msgs/Point[] vertices\n"},
+    {"shape_msgs/msg/MeshTriangle", "shape_msgs::msg::dds_::MeshTriangle_",
+     "RIHS01_618e5c073eeb729e433ef6226e72c01d995c459fb7d76348c9700409a5020bd0", "uint32[3] vertex_indices\n"},
+    {"shape_msgs/msg/Plane", "shape_msgs::msg::dds_::Plane_",
+     "RIHS01_dfbfe8314689c850615d4a727af017e9aa86c10e369a606c8c851ef8f16c58c8", "float64[4] coef\n"},
+    {"shape_msgs/msg/SolidPrimitive", "shape_msgs::msg::dds_::SolidPrimitive_",
+     "RIHS01_2802a15190aadc3f496584df4b0b4c5824d8a0b31aaef839faa75bc34dda38ac",
+     "uint8 type\n"
+     "float64[<=3] dimensions\n"
+     "geometry_msgs/Polygon polygon\n"},
     {"std_msgs/msg/ColorRGBA", "std_msgs::msg::dds_::ColorRGBA_",
      "RIHS01_77a7a5b9ae477306097665106e0413ba74440245b1f3d0c6d6405fe5c7813fe8",
      "float32 r\n"
@@ -420,6 +460,14 @@ PRESCENE_NAME(RosMarker, "visualization_msgs/msg/Marker")
 PRESCENE_NAME(RosMarkerArray, "visualization_msgs/msg/MarkerArray")
 PRESCENE_NAME(RosMeshFile, "visualization_msgs/msg/MeshFile")
 PRESCENE_NAME(RosUvCoordinate, "visualization_msgs/msg/UVCoordinate")
+PRESCENE_NAME(RosPoint32, "geometry_msgs/msg/Point32")
+PRESCENE_NAME(RosPolygon, "geometry_msgs/msg/Polygon")
+PRESCENE_NAME(RosCollisionObject, "moveit_msgs/msg/CollisionObject")
+PRESCENE_NAME(RosObjectType, "object_recognition_msgs/msg/ObjectType")
+PRESCENE_NAME(RosMesh, "shape_msgs/msg/Mesh")
+PRESCENE_NAME(RosMeshTriangle, "shape_msgs/msg/MeshTriangle")
+PRESCENE_NAME(RosPlane, "shape_msgs/msg/Plane")
+PRESCENE_NAME(RosSolidPrimitive, "shape_msgs/msg/SolidPrimitive")
 #undef PRESCENE_NAME
 
 }  // namespace prescene::interfaces

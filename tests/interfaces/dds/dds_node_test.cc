@@ -138,9 +138,28 @@ TEST(DdsNode, CarriesEveryFieldOfTheOtherTypes) {
   for (std::size_t i = 0; i < 36; ++i) pose.pose.covariance[i] = 0.25 * static_cast<double>(i);
   expect_round_trip(pose, "geometry_msgs/msg/PoseWithCovarianceStamped");
 
+  expect_round_trip(RosPoseArray{kHeader, {pose.pose.pose, {{-1.0, -2.0, -3.0}, {0.0, 0.0, 0.0, 1.0}}}},
+                    "geometry_msgs/msg/PoseArray");
+
   RosDetection3dArray detections{kHeader,
                                  {{kHeader, {{{"carton", 0.75}, pose.pose}}, {pose.pose.pose, {0.1, 0.2, 0.3}}, "7"}}};
   expect_round_trip(detections, "vision_msgs/msg/Detection3DArray");
+
+  RosCollisionObject object;
+  object.header = kHeader;
+  object.pose = pose.pose.pose;
+  object.id = "prescene/mug";
+  object.type = {"mug", "models"};
+  object.primitives = {{2, {0.1}, {}}, {5, {0.2}, {{{1.0F, 2.0F, 3.0F}, {4.0F, 5.0F, 6.0F}}}}};
+  object.primitive_poses = {pose.pose.pose, {}};
+  object.meshes = {{{{{0, 1, 2}}, {{2, 1, 0}}}, {{1.0, 2.0, 3.0}, {4.0, 5.0, 6.0}, {7.0, 8.0, 9.0}}}};
+  object.mesh_poses = {{}};
+  object.planes = {{{1.0, 2.0, 3.0, 4.0}}};
+  object.plane_poses = {pose.pose.pose};
+  object.subframe_names = {"handle", "rim"};
+  object.subframe_poses = {{}, pose.pose.pose};
+  object.operation = 3;
+  expect_round_trip(object, "moveit_msgs/msg/CollisionObject");
 
   RosMarker marker;
   marker.header = kHeader;

@@ -25,7 +25,8 @@ using AllMessages =
                    RosMeshFile, RosMarker, RosMarkerArray, RosKeyValue, RosDiagnosticStatus, RosDiagnosticArray,
                    RosParameterEvent, RosParameterDescriptor, RosListParametersRequest, RosListParametersResponse,
                    RosGetParametersRequest, RosGetParametersResponse, RosGetParameterTypesResponse,
-                   RosDescribeParametersResponse, RosSetParametersRequest, RosSetParametersResponse>;
+                   RosDescribeParametersResponse, RosSetParametersRequest, RosSetParametersResponse, RosSolidPrimitive,
+                   RosMesh, RosPlane, RosObjectType, RosCollisionObject>;
 TYPED_TEST_SUITE(CdrLaws, AllMessages);
 
 TYPED_TEST(CdrLaws, DecodingAndEncodingGivesTheBytesBackAndBothByteOrdersTheSameValues) {

@@ -21,6 +21,7 @@
 #include "prescene/core/status.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/parameter_messages.h"
+#include "prescene/interfaces/ros_messages/planning_messages.h"
 
 namespace prescene::interfaces {
 
@@ -65,6 +66,7 @@ enum class TopicQos {
   kReliable,  ///< Reliable, keep last 10: queries and answers of clients.
   kState,     ///< As kReliable, but a writer never waits: for state that the next sample replaces (poses, markers).
   kEvents,    ///< As kState, keep last 1000: changes of parameters.
+  kChanges,   ///< As kState, keep last 100: changes, none of which replaces another.
   kCommands,  ///< As kReliable, keep last 100: readers of questions and controls, none of which replaces another.
   kTf,        ///< Reliable, keep last 100; a reader does not get what writers of its own node send.
   kLatched,   ///< Reliable, transient local, keep last 1 (/tf_static writers, descriptions).
@@ -133,10 +135,12 @@ class DdsNode {
   core::Status publish(DdsPublisher publisher, const RosString& message);
   core::Status publish(DdsPublisher publisher, const RosClock& message);
   core::Status publish(DdsPublisher publisher, const RosPoseWithCovarianceStamped& message);
+  core::Status publish(DdsPublisher publisher, const RosPoseArray& message);
   core::Status publish(DdsPublisher publisher, const RosDetection3dArray& message);
   core::Status publish(DdsPublisher publisher, const RosMarkerArray& message);
   core::Status publish(DdsPublisher publisher, const RosDiagnosticArray& message);
   core::Status publish(DdsPublisher publisher, const RosParameterEvent& message);
+  core::Status publish(DdsPublisher publisher, const RosCollisionObject& message);
   /// Decodes a recorded message of the publisher's type and publishes it.
   core::Status publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, RIHS01 type hashes and `ros2msg` texts of the messages in messages.h and parameter_messages.h, as ROS 2 Humble
-// and Jazzy know them.
+// Names, RIHS01 type hashes and `ros2msg` texts of the messages in messages.h, parameter_messages.h and
+// planning_messages.h, as ROS 2 Humble and Jazzy know them.
 #pragma once
 
 #include <span>
@@ -9,6 +9,7 @@
 
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/parameter_messages.h"
+#include "prescene/interfaces/ros_messages/planning_messages.h"
 
 namespace prescene::interfaces {
 
@@ -148,5 +149,21 @@ template <>
 const RosType& ros_type<RosMeshFile>();
 template <>
 const RosType& ros_type<RosUvCoordinate>();
+template <>
+const RosType& ros_type<RosPoint32>();
+template <>
+const RosType& ros_type<RosPolygon>();
+template <>
+const RosType& ros_type<RosCollisionObject>();
+template <>
+const RosType& ros_type<RosObjectType>();
+template <>
+const RosType& ros_type<RosMesh>();
+template <>
+const RosType& ros_type<RosMeshTriangle>();
+template <>
+const RosType& ros_type<RosPlane>();
+template <>
+const RosType& ros_type<RosSolidPrimitive>();
 
 }  // namespace prescene::interfaces
