@@ -146,6 +146,12 @@ core::Result<ObjectSummary> object_from_json(const ordered_json& json) {
   }
   read_learned(json, object);
   read_alternatives(json, object);
+  if (const auto motion = json.find("motion"); motion != json.end() && motion->is_string()) {
+    for (const belief::MotionMode mode : {belief::MotionMode::kResting, belief::MotionMode::kHeld})
+      if (belief::to_string(mode) == motion->get<std::string>()) object.motion = mode;
+  }
+  if (const auto hand = json.find("held_by"); hand != json.end() && hand->is_string())
+    object.held_by = hand->get<std::string>();
   if (const auto size = json.find("size"); size != json.end() && size->is_array() && size->size() == 3) {
     object.is_new = true;
     for (Eigen::Index i = 0; i < 3; ++i) {
@@ -167,10 +173,16 @@ BeliefSummary summary_of(const belief::Belief& belief) {
                                estimate.mean, estimate.covariance, estimate.twist, object.evidence_per_pixel,
                                object.visible_share, belief::parameter_estimates(model, object.physics),
                                object.physics.lessons, object.physics.learned_ns});
-    summary.objects.back().alternatives = belief::alternative_poses(belief, object);
+    ObjectSummary& last = summary.objects.back();
+    last.alternatives = belief::alternative_poses(belief, object);
+    last.motion = estimate.motion;
+    const auto at = static_cast<std::size_t>(&object - belief.objects.data());
+    if (at < belief.scene->objects.size()) last.held_by = belief.scene->objects[at].held_by;
+    last.frames_unseen = object.frames_unseen;
+    last.frames_refuted = object.frames_refuted;
     if (!filter::is_unknown_object(object.name)) continue;
-    summary.objects.back().is_new = true;
-    summary.objects.back().size = box_of(model).sizes();
+    last.is_new = true;
+    last.size = box_of(model).sizes();
   }
   summary.joints = belief::joint_estimates(belief);
   return summary;
@@ -194,7 +206,9 @@ ordered_json to_json(const BeliefSummary& summary) {
                        {"parameters", belief::to_json(object.parameters)},
                        {"lessons", object.lessons},
                        {"learned_ns", object.learned_ns},
-                       {"alternatives", belief::to_json(object.alternatives)}});
+                       {"alternatives", belief::to_json(object.alternatives)},
+                       {"motion", belief::to_string(object.motion)},
+                       {"held_by", object.held_by ? ordered_json(*object.held_by) : ordered_json()}});
     if (object.is_new) objects.back()["size"] = {object.size.x(), object.size.y(), object.size.z()};
   }
   ordered_json json{{"step", summary.step}, {"stamp_ns", summary.stamp_ns}, {"objects", objects}};
@@ -243,6 +257,14 @@ interfaces::RosDetection3dArray detections_of(const BeliefSummary& summary, cons
       detection.bbox.size = {box.sizes().x(), box.sizes().y(), box.sizes().z()};
     }
     array.detections.push_back(std::move(detection));
+  }
+  return array;
+}
+
+interfaces::RosPoseArray poses_of(const BeliefSummary& summary, const std::string& world_frame) {
+  interfaces::RosPoseArray array{header_of(summary.stamp_ns, world_frame), {}};
+  for (const ObjectSummary& object : summary.objects) {
+    if (object.state != belief::TrackState::kLost) array.poses.push_back(interfaces::to_ros_pose(object.X_WO));
   }
   return array;
 }

@@ -65,7 +65,15 @@ void LiveService::Impl::check_sent(const core::Status& status) {
   core::log(log, core::LogLevel::kWarning, status.message());
 }
 
-void LiveService::Impl::publish() {
+void LiveService::Impl::publish_events(const std::vector<BeliefEvent>& happened) {
+  for (const BeliefEvent& event : happened) {
+    const std::string json = belief::json_text(to_json(event));
+    if (events_topic) check_sent(node->publish(*events_topic, interfaces::RosString{json}));
+    record(kEventsTopic, json);
+  }
+}
+
+void LiveService::Impl::publish(const TrackerStep& step) {
   const std::shared_ptr<const belief::Belief> belief = tracker->belief();
   const BeliefSummary summary = summary_of(*belief);
   const std::string& world = settings.tracker.assembler.world_frame;
@@ -73,6 +81,7 @@ void LiveService::Impl::publish() {
   check_sent(node->publish(beliefs, interfaces::RosString{json}));
   const core::TimeNs stamp_ns = summary.stamp_ns;
   publish(detections, kDetectionsTopic, kDetectionsType, detections_of(summary, *belief->scene, world), stamp_ns);
+  if (all_poses) publish(*all_poses, kPosesTopic, kPosesType, poses_of(summary, world), stamp_ns);
   if (belief->scene != published_scene) {
     add_marker_meshes(*belief->scene, meshes);
     published_scene = belief->scene;
@@ -90,6 +99,7 @@ void LiveService::Impl::publish() {
   if (transforms) check_sent(node->publish(*transforms, frames_of_objects));
   record_output(settings.tracker.topics.tf, kTransformsType, frames_of_objects, stamp_ns);
   record(kBeliefTopic, json);
+  publish_events(events.note(summary, *belief->scene, step.news));
 }
 
 void LiveService::Impl::advertise_new(const std::string& object) {
@@ -193,6 +203,8 @@ void LiveService::Impl::publish_diagnostics() {
   const ServiceHealth now = health();
   const core::TimeNs stamp_ns = tracker->uses_simulated_time() ? tracker->simulated_now_ns() : core::wall_now_ns();
   report_changes(now);
+  if (const auto event = events.note_frames(is_tracking(now), tracker->belief()->stamp_ns, health_text(now)))
+    publish_events({*event});
   check_sent(node->publish(
       diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(stamp_ns), ""},
                                                   {to_diagnostic(now, last_reported, settings.dds.node_name)}}));

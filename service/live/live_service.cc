@@ -156,8 +156,9 @@ ParameterHooks LiveService::Impl::parameter_hooks() {
 
 std::optional<interfaces::DdsPublisher> LiveService::Impl::advertised_if_allowed(const std::string& topic,
                                                                                  const std::string& type,
-                                                                                 const std::string& remedy) {
-  auto publisher = node->advertise(topic, type, TopicQos::kState);
+                                                                                 const std::string& remedy,
+                                                                                 TopicQos qos) {
+  auto publisher = node->advertise(topic, type, qos);
   if (publisher) return *publisher;
   core::log(log, core::LogLevel::kWarning,
             topic + " is not published: " + publisher.status().message() +
@@ -174,6 +175,8 @@ core::Status LiveService::Impl::join_bus() {
                node->advertise(kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray", TopicQos::kState));
   if (settings.publish_tf)
     transforms = advertised_if_allowed(settings.tracker.topics.tf, kTransformsType, "give --no-tf, or");
+  all_poses = advertised_if_allowed(kPosesTopic, kPosesType, "");
+  events_topic = advertised_if_allowed(kEventsTopic, "std_msgs/msg/String", "", TopicQos::kChanges);
   for (const belief::SceneObject& object : scene->objects) {
     PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name), kPoseType, TopicQos::kState));
   }
@@ -328,7 +331,7 @@ bool LiveService::Impl::look_after_frames() {
       not_simulated += static_cast<std::uint64_t>(step->counters.not_simulated);
       if (!step->physics_failure.empty()) physics_failure = step->physics_failure;
       note_idle(step->idle_controls);
-      publish();
+      publish(*step);
       history->note(tracker->belief());
       frames.add(step->observation, tracker->belief());
       if (settings.on_step) settings.on_step(*step, tracker->belief());

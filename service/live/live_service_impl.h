@@ -17,6 +17,7 @@
 #include "prescene/core/clock.h"
 #include "prescene/interfaces/bytes/kept_file.h"
 #include "prescene/service/belief_summary.h"
+#include "prescene/service/live/belief_events.h"
 #include "prescene/service/live/inbox.h"
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/live/log_limiter.h"
@@ -48,6 +49,7 @@ class RateLimit {
 
 struct LiveService::Impl {
   static constexpr const char* kDetectionsType = "vision_msgs/msg/Detection3DArray";
+  static constexpr const char* kPosesType = "geometry_msgs/msg/PoseArray";
   static constexpr const char* kMarkersType = "visualization_msgs/msg/MarkerArray";
   static constexpr const char* kTransformsType = "tf2_msgs/msg/TFMessage";
   static constexpr const char* kPoseType = "geometry_msgs/msg/PoseWithCovarianceStamped";
@@ -91,14 +93,16 @@ struct LiveService::Impl {
   /// What a service was called with, as if it had come on a topic: taken in and recorded.
   void put_text(const char* topic, const std::string& text);
   /// Of what the service can do without: nothing, and a warning, where it may not be written.
-  std::optional<interfaces::DdsPublisher> advertised_if_allowed(const std::string& topic, const std::string& type,
-                                                                const std::string& remedy);
+  std::optional<interfaces::DdsPublisher> advertised_if_allowed(
+      const std::string& topic, const std::string& type, const std::string& remedy,
+      interfaces::TopicQos qos = interfaces::TopicQos::kState);
   /// Steps the belief if a frame is complete, records what was answered, publishes. Whether it made a step: another
   /// camera's frame may be complete already.
   bool look_after_frames();
   /// Counts and logs a message that the middleware did not take.
   void check_sent(const core::Status& status);
-  void publish();
+  void publish(const TrackerStep& step);
+  void publish_events(const std::vector<BeliefEvent>& happened);
   /// Of the pose of an object that was found.
   void advertise_new(const std::string& object);
   void publish_diagnostics();
@@ -127,7 +131,8 @@ struct LiveService::Impl {
   RateLimit learned_limit;
 
   interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers;
-  std::optional<interfaces::DdsPublisher> transforms;
+  std::optional<interfaces::DdsPublisher> transforms, all_poses, events_topic;
+  BeliefEvents events;
   std::map<std::string, interfaces::DdsPublisher> poses;
   MessageIndex next_index = 0;
   core::TimeNs last_now_ns = 0;

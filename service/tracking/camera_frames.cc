@@ -357,19 +357,26 @@ std::string CameraFrames::lens_text() const {
   return text;
 }
 
-std::vector<std::string> CameraFrames::silent(core::TimeNs now_ns) const {
-  std::vector<std::string> words;
-  if (cameras_.size() < 2 || !began_ns_) return words;
+std::vector<SilentCamera> CameraFrames::silent_cameras(core::TimeNs now_ns) const {
+  std::vector<SilentCamera> silent;
+  if (cameras_.size() < 2 || !began_ns_) return silent;
   for (const Camera& camera : cameras_) {
     const auto& newest = camera.assembler.newest();
     if (now_ns - (newest ? newest->received_ns : *began_ns_) > kSilentNs)
-      words.push_back(camera.prefix + (newest ? "it sends no more depth images"
-                                              : "no depth image of it has come on " + camera.input.topics.depth +
-                                                    ": start its driver, or correct its topics in the scene file"));
+      silent.push_back({camera.input.name, newest ? "it sends no more depth images"
+                                                  : "no depth image of it has come on " + camera.input.topics.depth +
+                                                        ": start its driver, or correct its topics in the scene file"});
     else if (now_ns - std::max(camera.used_ns.value_or(*began_ns_), *began_ns_) > kSilentNs)
-      words.push_back(camera.prefix + "none of its frames is used" +
-                      (camera.last_skip.empty() ? "" : ": " + camera.last_skip));
+      silent.push_back({camera.input.name,
+                        "none of its frames is used" + (camera.last_skip.empty() ? "" : ": " + camera.last_skip)});
   }
+  return silent;
+}
+
+std::vector<std::string> CameraFrames::silent(core::TimeNs now_ns) const {
+  std::vector<std::string> words;
+  for (const SilentCamera& camera : silent_cameras(now_ns))
+    words.push_back("camera '" + camera.name + "': " + camera.reason);
   return words;
 }
 

@@ -223,6 +223,7 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
   belief::Observation& observation = frame.observation;
   observation.stamp_ns = waiting.stamp_ns;
   observation.frame.depth = waiting.depth;
+  frame.camera_frame = waiting.frame_id;
   observation.frame.camera = *camera_;
 
   // Colour helps but is not needed: a frame whose colour does not come in time goes without it.

@@ -190,6 +190,8 @@ TrackerStep Tracker::step_with(AssembledFrame frame, core::TimeNs now_ns) {
   step.record.step = result.belief.step;
   step.record.belief_hash = core::hash_text(belief::content_hash(result.belief));
   step.counters = result.counters;
+  step.news = {clock_went_back, restarts, result.counters.inferred_releases, frames_.silent_cameras(time_at(now_ns))};
+  step.camera_frame = std::move(frame.camera_frame);
   step.physics_failure = std::move(result.physics_failure);
   step.trace = std::move(result.trace);
   step.supports = std::move(result.supports);

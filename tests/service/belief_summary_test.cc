@@ -52,6 +52,39 @@ TEST(BeliefSummary, IsTheSameAfterJson) {
   EXPECT_EQ(read->objects[0].alternatives, summary.objects[0].alternatives);
 }
 
+TEST(BeliefSummary, TellsMotionAndHandAfterJson) {
+  const belief::Scene scene = box_on_floor();
+  BeliefSummary summary = summary_with(scene, {});
+  for (const belief::MotionMode motion :
+       {belief::MotionMode::kResting, belief::MotionMode::kHeld, belief::MotionMode::kMoving}) {
+    summary.objects[0].motion = motion;
+    summary.objects[0].held_by =
+        motion == belief::MotionMode::kHeld ? std::optional<std::string>("hand") : std::nullopt;
+    const auto read = belief_summary_from_json(belief::json_text(to_json(summary)));
+    ASSERT_TRUE(read.ok()) << read.status().message();
+    EXPECT_EQ(read->objects[0].motion, motion);
+    EXPECT_EQ(read->objects[0].held_by, summary.objects[0].held_by);
+  }
+}
+
+TEST(PosesOf, AreThoseOfDetectionsInTheirOrder) {
+  const belief::Scene scene = box_on_floor();
+  BeliefSummary summary = summary_with(scene, {});
+  for (int i = 0; i < 4; ++i) {
+    summary.objects.push_back(summary.objects[0]);
+    summary.objects.back().name += std::to_string(i);
+    summary.objects.back().X_WO = geometry::Pose::from_translation({0.1 * i, 0.2, 0.3});
+    summary.objects.back().state = i % 2 == 0 ? belief::TrackState::kLost : belief::TrackState::kUnseen;
+  }
+  const auto poses = poses_of(summary, "map");
+  const auto detections = detections_of(summary, scene, "map");
+  EXPECT_EQ(poses.header, detections.header);
+  ASSERT_EQ(poses.poses.size(), detections.detections.size());
+  EXPECT_EQ(poses.poses.size(), 3U);
+  for (std::size_t i = 0; i < poses.poses.size(); ++i)
+    EXPECT_EQ(poses.poses[i], detections.detections[i].results.at(0).pose.pose);
+}
+
 TEST(MarkersOf, DrawGhostsWhereAnObjectMayBeAndRemoveThemAfterwards) {
   const belief::Scene scene = box_on_floor();
   const MarkerMeshes meshes = marker_meshes(scene);

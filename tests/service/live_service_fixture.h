@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -39,6 +40,7 @@ class LiveServiceTest : public ::testing::Test {
     settings.diagnostics_rate = 50.0;
     settings.tracker.topics.clock = clock;
     settings.learned_file = learned_file_;
+    if (adjust_) adjust_(settings);
     const core::LogSink log = [this](core::LogLevel, const std::string& text) {
       const std::lock_guard lock(log_mutex_);
       log_.push_back(text);
@@ -91,6 +93,7 @@ class LiveServiceTest : public ::testing::Test {
   core::Status status_;
   std::unique_ptr<LiveService> service_;
   std::string learned_file_;
+  std::function<void(LiveSettings&)> adjust_;  // of what start() starts
   std::thread runner_;
 };
 

@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   } rows[] = {{service::kBeliefTopic, string},
               {service::kAnswerTopic, string},
               {service::kMarkersTopic, "visualization_msgs/msg/MarkerArray"},
+              {service::kPosesTopic, "geometry_msgs/msg/PoseArray"},
               {service::kDetectionsTopic, "vision_msgs/msg/Detection3DArray"},
               {service::kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray"},
               {service::pose_topic("box"), "geometry_msgs/msg/PoseWithCovarianceStamped"}};

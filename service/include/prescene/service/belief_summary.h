@@ -4,6 +4,7 @@
 
 #include <map>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,9 @@ struct ObjectSummary {
   /// Edges of the bounding box of a new one in its own frame, about its origin, m; zero for others.
   geometry::Vector3d size = geometry::Vector3d::Zero();
   std::vector<belief::AlternativePose> alternatives = {};  ///< Where else it may be.
+  belief::MotionMode motion = belief::MotionMode::kMoving;
+  std::optional<std::string> held_by = {};    ///< The hand; empty = free.
+  int frames_unseen = 0, frames_refuted = 0;  ///< As ObjectBelief's; not in JSON.
 };
 
 struct BeliefSummary {
@@ -45,8 +49,8 @@ struct BeliefSummary {
 BeliefSummary summary_of(const belief::Belief& belief);
 /// {"step", "stamp_ns", "objects": [{"name", "model", "state", "confidence", "existence", "pose", "covariance" (36
 /// numbers, row-major), "twist", "evidence_per_pixel", "visible_share", "parameters": [{"name", "mean",
-/// "standard_deviation", "low", "high"}], "lessons", "learned_ns", "alternatives": [{"pose", "probability"}], of new
-/// objects "size" ([x, y, z])}],
+/// "standard_deviation", "low", "high"}], "lessons", "learned_ns", "alternatives": [{"pose", "probability"}], "motion"
+/// ("resting", "moving" or "held"), "held_by" (null: nothing), of new objects "size" ([x, y, z])}],
 /// where the scene has joints "joints": [{"joint", "type", "unit", "position", "standard_deviation", "velocity",
 /// "limits", "confidence"}]}
 nlohmann::ordered_json to_json(const BeliefSummary& summary);
@@ -57,6 +61,8 @@ interfaces::RosDetection3dArray detections_of(const BeliefSummary& summary, cons
                                               const std::string& world_frame);
 interfaces::RosPoseWithCovarianceStamped pose_of(const ObjectSummary& object, core::TimeNs stamp_ns,
                                                  const std::string& world_frame);
+/// In the order of detections_of().
+interfaces::RosPoseArray poses_of(const BeliefSummary& summary, const std::string& world_frame);
 /// The frame prescene/OBJECT of each, from the world's.
 /// Of the frames of objects: "prescene/mug".
 inline constexpr const char* kFramePrefix = "prescene/";

@@ -60,6 +60,12 @@ class PicturedFrames {
   std::optional<core::TimeNs> first_ns_;  // stamp of the first camera's newest
 };
 
+/// A camera that gives nothing: it has sent nothing for a second, or what it sends is not used, and why.
+struct SilentCamera {
+  std::string name;
+  std::string reason;
+};
+
 /// Not thread-safe. Reads no clock.
 class CameraFrames {
  public:
@@ -94,8 +100,9 @@ class CameraFrames {
   std::uint64_t tf_forgotten() const { return cameras_.front().assembler.tf_forgotten(); }
   std::uint64_t tf_late() const { return cameras_.front().assembler.tf_late(); }
 
-  /// Of several cameras those that give nothing, a sentence each: they have sent nothing for a second, or what they
-  /// send is not used, and why.
+  /// Of several cameras those that give nothing.
+  std::vector<SilentCamera> silent_cameras(core::TimeNs now_ns) const;
+  /// The same, a sentence each.
   std::vector<std::string> silent(core::TimeNs now_ns) const;
   /// Of several cameras what was used of each since the start, for a person; "" of a single one.
   std::string counts_text() const;

@@ -53,7 +53,9 @@ inline constexpr const char* kAnswerTopic = "/prescene/answer";      ///< out
 inline constexpr const char* kProgressTopic = "/prescene/progress";  ///< out: how far the work on a question is
 inline constexpr const char* kBeliefTopic = "/prescene/belief";      ///< out: states and estimates as JSON
 inline constexpr const char* kDetectionsTopic = "/prescene/detections";  ///< out: vision_msgs/Detection3DArray
+inline constexpr const char* kPosesTopic = "/prescene/poses";            ///< out: geometry_msgs/PoseArray
 inline constexpr const char* kMarkersTopic = "/prescene/markers";        ///< out: visualization_msgs/MarkerArray
+inline constexpr const char* kEventsTopic = "/prescene/events";          ///< out: changes of state as JSON
 inline constexpr const char* kDiagnosticsTopic = "/diagnostics";         ///< out: diagnostic_msgs/DiagnosticArray
 /// Whether a message holds transforms of objects alone, which a service published: none of the robot's.
 bool are_of_objects(const interfaces::ReceivedMessage& message);

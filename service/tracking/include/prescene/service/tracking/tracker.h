@@ -26,6 +26,14 @@
 
 namespace prescene::service {
 
+/// What happened in a step besides what the belief after it says.
+struct StepNews {
+  bool clock_went_back = false;  ///< So that the belief began anew, ...
+  bool restarted = false;        ///< ... or as a control asked.
+  int inferred_releases = 0;     ///< As in filter::StepCounters.
+  std::vector<SilentCamera> silent = {};
+};
+
 /// One belief step as it happened.
 struct TrackerStep {
   StepRecord record;
@@ -35,6 +43,8 @@ struct TrackerStep {
   filter::HashTrace trace;                           ///< Empty unless Tracker::trace_stages() asks for it.
   std::vector<filter::SupportMeasurement> supports;  ///< As in filter::StepResult.
   belief::Observation observation;
+  std::string camera_frame;  ///< As of AssembledFrame.
+  StepNews news;
 };
 
 /// Not thread-safe but for belief().

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the service publishes besides the belief, as a subscriber gets it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
+#include "tests/service/live_service_fixture.h"
+
+namespace prescene::service::live_outputs_test {
+namespace {
+
+using interfaces::TopicQos;
+
+class LiveOutputsTest : public LiveServiceTest {
+ protected:
+  void SetUp() override {
+    LiveServiceTest::SetUp();
+    interfaces::DdsOptions options;
+    options.domain = tests::own_domain();
+    options.node_name = "listener";
+    auto node = interfaces::DdsNode::create(options, {});
+    ASSERT_TRUE(node.ok()) << node.status().message();
+    node_ = *std::move(node);
+  }
+  void TearDown() override {
+    LiveServiceTest::TearDown();
+    node_.reset();
+  }
+  void listen(const std::string& topic, const std::string& type) {
+    ASSERT_TRUE(node_
+                    ->subscribe(topic, type, TopicQos::kReliable,
+                                [this](interfaces::ReceivedMessage&& message) {
+                                  const std::lock_guard lock(mutex_);
+                                  received_[message.topic].push_back(message.cdr);
+                                })
+                    .ok());
+  }
+  template <class Message>
+  std::vector<Message> heard(const std::string& topic) {
+    const std::lock_guard lock(mutex_);
+    std::vector<Message> messages;
+    for (const auto& cdr : received_[topic]) {
+      const auto message = interfaces::decode_cdr<Message>(cdr);
+      EXPECT_TRUE(message.ok()) << message.status().message();
+      if (message) messages.push_back(*message);
+    }
+    return messages;
+  }
+  std::vector<nlohmann::ordered_json> events() {
+    std::vector<nlohmann::ordered_json> events;
+    for (const auto& text : heard<interfaces::RosString>(kEventsTopic))
+      events.push_back(nlohmann::ordered_json::parse(text.data));
+    return events;
+  }
+  bool has_event(const std::string& word) {
+    const auto all = events();
+    return std::any_of(all.begin(), all.end(), [&](const auto& event) { return event.at("event") == word; });
+  }
+
+  std::mutex mutex_;
+  std::map<std::string, std::vector<std::vector<std::uint8_t>>> received_;
+  std::unique_ptr<interfaces::DdsNode> node_;  // last: its thread ends before what it fills
+};
+
+TEST_F(LiveOutputsTest, PosesAreThoseOfTheBelief) {
+  listen(kPosesTopic, "geometry_msgs/msg/PoseArray");
+  start();
+  ASSERT_TRUE(robot_.send_until([&] { return heard<interfaces::RosPoseArray>(kPosesTopic).size() > 2; }, kNoon));
+  const auto poses = heard<interfaces::RosPoseArray>(kPosesTopic);
+  EXPECT_EQ(poses.back().header.frame_id, "world");
+  ASSERT_EQ(poses.back().poses.size(), 1U);
+  EXPECT_NEAR(poses.back().poses[0].position.z, 0.05, 0.03);
+}
+
+TEST_F(LiveOutputsTest, EventsTellOfTheObjectAndOfTheClock) {
+  listen(kEventsTopic, "std_msgs/msg/String");
+  start();
+  // Whoever comes late misses the first events; a belief that begins anew tells them again.
+  ASSERT_TRUE(tracks_from(kNoon));
+  ASSERT_TRUE(robot_.send_until([&] { return has_event("clock_set_back"); }, kNoon - 3600 * kSecond));
+  const auto all = events();
+  const auto began =
+      std::find_if(all.begin(), all.end(), [](const auto& e) { return e.at("event") == "clock_set_back"; });
+  ASSERT_NE(began + 1, all.end());
+  EXPECT_EQ((began + 1)->at("event"), "found");
+  EXPECT_EQ((began + 1)->at("object"), "box");
+  EXPECT_TRUE((began + 1)->at("from").is_null());
+  EXPECT_EQ((began + 1)->at("to"), "tracked");
+  EXPECT_EQ((began + 1)->at("stamp_ns"), began->at("stamp_ns"));
+}
+
+}  // namespace
+}  // namespace prescene::service::live_outputs_test
