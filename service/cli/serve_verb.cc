@@ -137,6 +137,12 @@ Verb add_serve_verb(CLI::App& app) {
     verb->get_option(name)->needs(verb->get_option("--view"));
   verb->add_flag("!--no-tf", options->settings.publish_tf,
                  "Do not publish the objects' poses on the tf topic, as frames prescene/OBJECT");
+  verb->add_option(
+          "--overlay-rate", options->settings.overlay_rate,
+          "Pictures of the camera with the belief drawn over it, on /prescene/overlay/image, a second at most; "
+          "they are made only while somebody looks; 0 = none")
+      ->check(number_between(0.0, 100.0))
+      ->capture_default_str();
   add_proposals_option(*verb, options->proposals);
   add_bus_options(*verb, options->settings.dds, options->settings.tracker);
   add_camera_options(*verb, options->settings.tracker.assembler);

@@ -100,6 +100,8 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   record_output(settings.tracker.topics.tf, kTransformsType, frames_of_objects, stamp_ns);
   record(kBeliefTopic, json);
   publish_events(events.note(summary, *belief->scene, step.news));
+  if (overlay && overlay->wants(step.observation))
+    overlay->show({belief, summary, step.observation, step.camera_frame});
 }
 
 void LiveService::Impl::advertise_new(const std::string& object) {

@@ -160,11 +160,15 @@ std::optional<interfaces::DdsPublisher> LiveService::Impl::advertised_if_allowed
                                                                                  TopicQos qos) {
   auto publisher = node->advertise(topic, type, qos);
   if (publisher) return *publisher;
-  core::log(log, core::LogLevel::kWarning,
-            topic + " is not published: " + publisher.status().message() +
-                (remedy.empty() ? ": " : ": " + remedy + " ") +
-                "with --security make keys that allow it (docs/reference/security.md)");
+  warn_not_published(topic, publisher.status(), remedy);
   return std::nullopt;
+}
+
+void LiveService::Impl::warn_not_published(const std::string& topic, const core::Status& why,
+                                           const std::string& remedy) {
+  core::log(log, core::LogLevel::kWarning,
+            topic + " is not published: " + why.message() + (remedy.empty() ? ": " : ": " + remedy + " ") +
+                "with --security make keys that allow it (docs/reference/security.md)");
 }
 
 core::Status LiveService::Impl::join_bus() {
@@ -177,6 +181,14 @@ core::Status LiveService::Impl::join_bus() {
     transforms = advertised_if_allowed(settings.tracker.topics.tf, kTransformsType, "give --no-tf, or");
   all_poses = advertised_if_allowed(kPosesTopic, kPosesType, "");
   events_topic = advertised_if_allowed(kEventsTopic, "std_msgs/msg/String", "", TopicQos::kChanges);
+  if (settings.overlay_rate > 0.0) {
+    auto made = OverlayPublisher::create(*node, *backends, settings.overlay_rate,
+                                         [this](const core::Status& why) { check_sent(why); });
+    if (made)
+      overlay = *std::move(made);
+    else
+      warn_not_published(kOverlayTopic, made.status(), "give --overlay-rate 0, or");
+  }
   for (const belief::SceneObject& object : scene->objects) {
     PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name), kPoseType, TopicQos::kState));
   }

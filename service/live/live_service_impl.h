@@ -21,6 +21,7 @@
 #include "prescene/service/live/inbox.h"
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/live/log_limiter.h"
+#include "prescene/service/live/overlay_publisher.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/live/service_health.h"
 #include "prescene/service/live/service_manager.h"
@@ -96,6 +97,7 @@ struct LiveService::Impl {
   std::optional<interfaces::DdsPublisher> advertised_if_allowed(
       const std::string& topic, const std::string& type, const std::string& remedy,
       interfaces::TopicQos qos = interfaces::TopicQos::kState);
+  void warn_not_published(const std::string& topic, const core::Status& why, const std::string& remedy);
   /// Steps the belief if a frame is complete, records what was answered, publishes. Whether it made a step: another
   /// camera's frame may be complete already.
   bool look_after_frames();
@@ -183,12 +185,14 @@ struct LiveService::Impl {
   std::unique_ptr<ParameterServices> parameter_services;
   std::unique_ptr<ServiceCalls> calls;
   std::unique_ptr<HistoryKeeper> history;
+  std::unique_ptr<OverlayPublisher> overlay;  // null where none is offered
   std::unique_ptr<QueryWorker> worker;
 
   ~Impl() {
     if (node) node->stop_receiving();  // no more questions for the worker,
     worker.reset();                    // no more answers for the bus
     history.reset();
+    overlay.reset();
   }
 };
 

@@ -6,8 +6,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "prescene/interfaces/images/jpeg.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
+#include "prescene/service/live/overlay_publisher.h"
 #include "tests/service/live_service_fixture.h"
 
 namespace prescene::service::live_outputs_test {
@@ -91,6 +93,51 @@ TEST_F(LiveOutputsTest, EventsTellOfTheObjectAndOfTheClock) {
   EXPECT_TRUE((began + 1)->at("from").is_null());
   EXPECT_EQ((began + 1)->at("to"), "tracked");
   EXPECT_EQ((began + 1)->at("stamp_ns"), began->at("stamp_ns"));
+}
+
+TEST_F(LiveOutputsTest, TheOverlayIsTheFrameWithTheBeliefDrawnOverIt) {
+  listen(kOverlayTopic, "sensor_msgs/msg/Image");
+  listen(kOverlayCompressedTopic, "sensor_msgs/msg/CompressedImage");
+  listen(kOverlayInfoTopic, "sensor_msgs/msg/CameraInfo");
+  adjust_ = [](LiveSettings& settings) { settings.overlay_rate = 100.0; };
+  start();
+  ASSERT_TRUE(robot_.send_until(
+      [&] {
+        return heard<interfaces::RosImage>(kOverlayTopic).size() > 1 &&
+               heard<interfaces::RosCompressedImage>(kOverlayCompressedTopic).size() > 1 &&
+               heard<interfaces::RosCameraInfo>(kOverlayInfoTopic).size() > 1;
+      },
+      kNoon));
+  const auto image = heard<interfaces::RosImage>(kOverlayTopic).back();
+  const auto info = heard<interfaces::RosCameraInfo>(kOverlayInfoTopic).back();
+  const interfaces::RosImage& depth = robot_.depth();
+  EXPECT_EQ(image.encoding, "rgb8");
+  EXPECT_EQ(image.width, depth.width);
+  EXPECT_EQ(image.height, depth.height);
+  EXPECT_EQ(image.header.frame_id, depth.header.frame_id);
+  EXPECT_EQ(info.header.frame_id, depth.header.frame_id);
+  EXPECT_EQ(info.width, depth.width);
+  EXPECT_EQ(info.k, robot_.camera_info().k);
+  // The outline of the box is drawn in a colour that a camera's picture of it does not have: saturated.
+  int saturated = 0;
+  for (std::size_t i = 0; i + 2 < image.data.size(); i += 3) {
+    const auto [least, most] = std::minmax({image.data[i], image.data[i + 1], image.data[i + 2]});
+    saturated += most - least > 120 ? 1 : 0;
+  }
+  EXPECT_GT(saturated, 20);
+  const auto packed = heard<interfaces::RosCompressedImage>(kOverlayCompressedTopic).back();
+  const auto picture = interfaces::decode_jpeg(packed.data);
+  ASSERT_TRUE(picture.ok()) << picture.status().message();
+  EXPECT_EQ(picture->width(), static_cast<int>(depth.width));
+  EXPECT_THAT(packed.format, ::testing::HasSubstr("jpeg"));
+}
+
+TEST_F(LiveOutputsTest, NoOverlayIsWantedWhereNobodyLooks) {
+  auto overlay = OverlayPublisher::create(*node_, backends_, 5.0, [](const core::Status&) {});
+  ASSERT_TRUE(overlay.ok()) << overlay.status().message();
+  EXPECT_FALSE((*overlay)->wants({}));
+  EXPECT_EQ((*overlay)->drawn(), 0U);
+  overlay->reset();
 }
 
 }  // namespace
