@@ -143,6 +143,10 @@ Verb add_serve_verb(CLI::App& app) {
           "they are made only while somebody looks; 0 = none")
       ->check(number_between(0.0, 100.0))
       ->capture_default_str();
+  verb->add_flag("--planning-scene", options->settings.planning_scene,
+                 "Keep MoveIt's planning scene as the belief is, on /collision_object");
+  verb->add_flag("--planning-scene-supports", options->settings.planning_supports, "Put the supports into it, too")
+      ->needs(verb->get_option("--planning-scene"));
   add_proposals_option(*verb, options->proposals);
   add_bus_options(*verb, options->settings.dds, options->settings.tracker);
   add_camera_options(*verb, options->settings.tracker.assembler);

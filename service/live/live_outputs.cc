@@ -100,6 +100,9 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   record_output(settings.tracker.topics.tf, kTransformsType, frames_of_objects, stamp_ns);
   record(kBeliefTopic, json);
   publish_events(events.note(summary, *belief->scene, step.news));
+  if (collisions)
+    for (const auto& message : planning.changes(summary, *belief->scene, world, node->matched_readers(*collisions)))
+      check_sent(node->publish(*collisions, message));
   if (overlay && overlay->wants(step.observation))
     overlay->show({belief, summary, step.observation, step.camera_frame});
 }

@@ -71,7 +71,8 @@ LiveService::Impl::Impl(std::shared_ptr<const belief::Scene> a_scene, const Live
       marker_limit(settings.marker_rate),
       diagnostics_limit(settings.diagnostics_rate),
       frames(frame_settings(settings)),
-      learned_limit(1.0 / settings.learned_interval) {
+      learned_limit(1.0 / settings.learned_interval),
+      planning({.supports = settings.planning_supports}) {
   learned_limit.due();  // not before there is a frame
   if (!settings.learned_file.empty()) learned_file = std::make_unique<interfaces::KeptFile>(settings.learned_file);
 }
@@ -181,6 +182,9 @@ core::Status LiveService::Impl::join_bus() {
     transforms = advertised_if_allowed(settings.tracker.topics.tf, kTransformsType, "give --no-tf, or");
   all_poses = advertised_if_allowed(kPosesTopic, kPosesType, "");
   events_topic = advertised_if_allowed(kEventsTopic, "std_msgs/msg/String", "", TopicQos::kChanges);
+  if (settings.planning_scene)
+    collisions =
+        advertised_if_allowed(kCollisionTopic, kCollisionType, "leave --planning-scene out, or", TopicQos::kChanges);
   if (settings.overlay_rate > 0.0) {
     auto made = OverlayPublisher::create(*node, *backends, settings.overlay_rate,
                                          [this](const core::Status& why) { check_sent(why); });

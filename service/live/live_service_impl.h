@@ -22,6 +22,7 @@
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/live/log_limiter.h"
 #include "prescene/service/live/overlay_publisher.h"
+#include "prescene/service/live/planning_scene.h"
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/live/service_health.h"
 #include "prescene/service/live/service_manager.h"
@@ -53,6 +54,7 @@ struct LiveService::Impl {
   static constexpr const char* kPosesType = "geometry_msgs/msg/PoseArray";
   static constexpr const char* kMarkersType = "visualization_msgs/msg/MarkerArray";
   static constexpr const char* kTransformsType = "tf2_msgs/msg/TFMessage";
+  static constexpr const char* kCollisionType = "moveit_msgs/msg/CollisionObject";
   static constexpr const char* kPoseType = "geometry_msgs/msg/PoseWithCovarianceStamped";
 
   Impl(std::shared_ptr<const belief::Scene> a_scene, const LiveSettings& a_settings, std::unique_ptr<Tracker> a_tracker,
@@ -133,8 +135,9 @@ struct LiveService::Impl {
   RateLimit learned_limit;
 
   interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers;
-  std::optional<interfaces::DdsPublisher> transforms, all_poses, events_topic;
+  std::optional<interfaces::DdsPublisher> transforms, all_poses, events_topic, collisions;
   BeliefEvents events;
+  PlanningScene planning;
   std::map<std::string, interfaces::DdsPublisher> poses;
   MessageIndex next_index = 0;
   core::TimeNs last_now_ns = 0;

@@ -90,6 +90,8 @@ std::vector<NodeParameter> service_parameters(const belief::Scene& scene, const 
   fixed("tf_topic", topics.tf, "Topic of the transforms.");
   fixed("publish_tf", settings.publish_tf, "Whether the objects' poses are published there, too.");
   fixed("overlay_rate", settings.overlay_rate, "Pictures of the overlay a second, at most; 0 = none.");
+  fixed("planning_scene", settings.planning_scene, "Whether MoveIt is told where the objects are.");
+  fixed("planning_scene_supports", settings.planning_supports, "Whether it is told of the supports, too.");
   fixed("tf_static_topic", topics.tf_static, "Topic of the static transforms.");
   fixed("joint_states_topic", topics.joint_states, "Topic of the joint states; empty = none.");
   fixed("use_sim_time", !topics.clock.empty(), "Whether time is simulated, and comes on /clock.");

@@ -140,5 +140,23 @@ TEST_F(LiveOutputsTest, NoOverlayIsWantedWhereNobodyLooks) {
   overlay->reset();
 }
 
+TEST_F(LiveOutputsTest, MoveItHearsWhereTheObjectIs) {
+  listen(kCollisionTopic, "moveit_msgs/msg/CollisionObject");
+  adjust_ = [](LiveSettings& settings) { settings.planning_scene = settings.planning_supports = true; };
+  start();
+  const auto find = [&](const std::string& id) {
+    for (const auto& object : heard<interfaces::RosCollisionObject>(kCollisionTopic))
+      if (object.id == id && object.operation == static_cast<std::uint8_t>(interfaces::RosCollisionOperation::kAdd))
+        return std::optional(object);
+    return std::optional<interfaces::RosCollisionObject>();
+  };
+  ASSERT_TRUE(robot_.send_until([&] { return find("prescene/box") && find("prescene/table"); }, kNoon));
+  const auto box = *find("prescene/box");
+  EXPECT_EQ(box.header.frame_id, "world");
+  EXPECT_NEAR(box.pose.position.z, 0.05, 0.03);
+  ASSERT_EQ(box.primitives.size(), 1U);
+  EXPECT_EQ(box.primitives[0].dimensions, (std::vector<double>{0.12, 0.08, 0.1}));
+}
+
 }  // namespace
 }  // namespace prescene::service::live_outputs_test

@@ -39,6 +39,9 @@ struct LiveSettings {
   /// Publish where the objects are on the tf topic, too, as frames "prescene/OBJECT". They are not read back.
   bool publish_tf = true;
   double overlay_rate = 5.0;  ///< Pictures of the overlay a second, at most; 0 = it is not offered.
+  /// Tell MoveIt where the objects are; the supports, too.
+  bool planning_scene = false;
+  bool planning_supports = false;
   /// For who looks on, all optional: what they do delays the service, so that they only hand over. Called on the
   /// thread of the belief after each step, with its belief; on those of the questions with each answer; and with each
   /// round of diagnostics, with a sentence on how the service is.

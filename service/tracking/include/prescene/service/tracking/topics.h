@@ -59,7 +59,8 @@ inline constexpr const char* kEventsTopic = "/prescene/events";          ///< ou
 inline constexpr const char* kOverlayTopic = "/prescene/overlay/image";  ///< out: sensor_msgs/Image
 inline constexpr const char* kOverlayCompressedTopic = "/prescene/overlay/image/compressed";  ///< out: the same as JPEG
 inline constexpr const char* kOverlayInfoTopic = "/prescene/overlay/camera_info";  ///< out: sensor_msgs/CameraInfo
-inline constexpr const char* kDiagnosticsTopic = "/diagnostics";  ///< out: diagnostic_msgs/DiagnosticArray
+inline constexpr const char* kCollisionTopic = "/collision_object";  ///< out: moveit_msgs/CollisionObject, for MoveIt
+inline constexpr const char* kDiagnosticsTopic = "/diagnostics";     ///< out: diagnostic_msgs/DiagnosticArray
 /// Whether a message holds transforms of objects alone, which a service published: none of the robot's.
 bool are_of_objects(const interfaces::ReceivedMessage& message);
 /// out: geometry_msgs/PoseWithCovarianceStamped of each object
