@@ -12,6 +12,7 @@
 #include <dds/dds.h>
 #include "prescene/core/status.h"
 #include "prescene/interfaces/dds/dds_node.h"
+#include "prescene/interfaces/dds/service_request.h"
 
 namespace prescene::interfaces {
 
@@ -23,13 +24,6 @@ core::Result<std::string> dds_topic_name(const std::string& ros_topic);
 std::optional<std::string> ros_topic_name(const std::string& dds_topic);
 /// "std_msgs::msg::dds_::String_" -> "std_msgs/msg/String"; nothing for other forms.
 std::optional<std::string> ros_type_name(std::string_view dds_type);
-
-/// What the fields of a request become.
-enum class ServiceForm {
-  kEmpty,   ///< None: it has none.
-  kText,    ///< ServiceRequest::text: it has one, which is a text.
-  kFields,  ///< ServiceRequest::fields: a message.
-};
 
 /// A type of service: what its two topics carry.
 struct ServiceType {
