@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "foxglove_server.h"
+#include "prescene/service/view/foxglove_server.h"
 
 #include <algorithm>
 #include <limits>

@@ -14,8 +14,8 @@
 #include "prescene/belief/json.h"
 #include "prescene/core/thread_priority.h"
 #include "prescene/service/tracking/camera_frames.h"
+#include "prescene/service/view/question_ids.h"
 #include "prescene/service/view/view_history.h"
-#include "question_ids.h"
 
 namespace prescene::service {
 namespace {

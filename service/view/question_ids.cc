@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "question_ids.h"
+#include "prescene/service/view/question_ids.h"
 
 #include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "json_fields.h"
 #include "prescene/belief/json.h"
+#include "prescene/belief/scene.h"
+#include "prescene/service/outside_json.h"
 
 namespace prescene::service {
 namespace {
@@ -13,6 +15,22 @@ namespace {
 constexpr std::string_view kIdPrefix = "view-";
 
 }  // namespace
+
+std::optional<nlohmann::ordered_json> page_request(std::string_view text) {
+  nlohmann::ordered_json request = parse_or_discard(text, kMostPageRequestBytes);
+  if (!request.is_object() || !request.contains("op") || !request["op"].is_string()) return std::nullopt;
+  return request;
+}
+
+std::optional<StepRequest> step_request(const nlohmann::ordered_json& request) {
+  const auto index = request.find("index");
+  if (index == request.end() || !index->is_number_unsigned()) return std::nullopt;
+  StepRequest asked{index->get<std::uint64_t>()};
+  const auto camera = request.find("camera");
+  if (camera != request.end() && camera->is_number_unsigned() && camera->get<std::uint64_t>() < belief::kMostCameras)
+    asked.camera = static_cast<int>(camera->get<std::uint64_t>());
+  return asked;
+}
 
 core::Result<std::string> question_text(PageQuestion& asked, const nlohmann::ordered_json& request) {
   const auto number = request.find("number");

@@ -10,8 +10,8 @@
 #include <string>
 #include <thread>
 
+#include "prescene/service/view/question_ids.h"
 #include "prescene/service/view/recording_view.h"
-#include "question_ids.h"
 
 namespace prescene::service {
 

@@ -162,12 +162,8 @@ void RecordingView::Impl::open(WebClient client) {
 
 void RecordingView::Impl::take(WebClient client, const std::string& op, const ordered_json& request) {
   if (op == "ask") return ask(client, request);
-  const auto index = request.find("index");
-  const auto camera = request.find("camera");
-  const bool has_camera =
-      camera != request.end() && camera->is_number_unsigned() && camera->get<std::uint64_t>() < belief::kMostCameras;
-  if (op == "show" && index != request.end() && index->is_number_unsigned())
-    show(client, index->get<std::uint64_t>(), has_camera ? static_cast<int>(camera->get<std::uint64_t>()) : 0);
+  if (op != "show") return;
+  if (const auto asked = step_request(request)) show(client, asked->index, asked->camera);
 }
 
 std::uint64_t RecordingView::Impl::step_of(std::uint64_t index, int camera) {

@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "foxglove_server.h"
 #include "page_files.h"
 #include "prescene/belief/json.h"
-#include "prescene/service/outside_json.h"
+#include "prescene/service/view/foxglove_server.h"
+#include "prescene/service/view/question_ids.h"
 
 namespace prescene::service {
 namespace {
@@ -15,7 +15,6 @@ namespace {
 using interfaces::WebClient;
 
 constexpr const char* kSubprotocol = "prescene.view.v1";
-constexpr std::size_t kMostRequestBytes = std::size_t{64} << 10;
 
 void put_u64(std::uint64_t value, std::string& bytes) {
   for (unsigned shift = 0; shift < 64; shift += 8) bytes += static_cast<char>((value >> shift) & 0xffU);
@@ -45,7 +44,7 @@ core::Result<std::unique_ptr<ViewServer>> ViewServer::create(const ViewOptions& 
   web.token = options.token;
   web.allowed_origins = options.allowed_origins;
   web.subprotocols = {kSubprotocol};
-  web.max_message_bytes = kMostRequestBytes;
+  web.max_message_bytes = kMostPageRequestBytes;
   if (web.token.empty() && !interfaces::is_loopback(web.address)) {
     PRESCENE_TRY(web.token, interfaces::random_web_token());
   }
@@ -92,9 +91,8 @@ void ViewServer::take(WebClient client, const std::string& text) {
     is_page = pages_.contains(client);
   }
   if (!is_page) return foxglove_->take(client, text, [this](WebClient to, const auto& message) { send(to, message); });
-  const nlohmann::ordered_json request = parse_or_discard(text, kMostRequestBytes);
-  if (!request.is_object() || !request.contains("op") || !request["op"].is_string()) return;
-  if (handlers_.on_request) handlers_.on_request(client, request["op"].get<std::string>(), request);
+  const auto request = page_request(text);
+  if (request && handlers_.on_request) handlers_.on_request(client, request->at("op").get<std::string>(), *request);
 }
 
 void ViewServer::close(WebClient client) {

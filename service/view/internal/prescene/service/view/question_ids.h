@@ -1,16 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-// Questions from a page travel under ids of ours, so that each answer finds its page.
+// What a page sends. Its questions travel under ids of ours, so that each answer finds its page.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "prescene/core/status.h"
 #include "prescene/interfaces/web/web_server.h"
 
 namespace prescene::service {
+
+/// A longer text of a page is none of its messages.
+inline constexpr std::size_t kMostPageRequestBytes = std::size_t{64} << 10;
+/// A page's message: an object with a text "op"; nothing for what is none.
+std::optional<nlohmann::ordered_json> page_request(std::string_view text);
+
+/// Which step of a recording, and whose picture.
+struct StepRequest {
+  std::uint64_t index = 0;
+  int camera = 0;  ///< Below belief::kMostCameras; 0 where none such is named.
+};
+/// Of {"op": "show", "index": i, "camera": c}; nothing without an index.
+std::optional<StepRequest> step_request(const nlohmann::ordered_json& request);
 
 struct PageQuestion {
   interfaces::WebClient client = 0;
