@@ -24,6 +24,7 @@ usage: ./dev VERB
                                disk, rights, descriptors, memory, clock, publishers, second, reader, supervisor, flood, soak.
                                SECONDS: how long soak and flood last (default 180 and 30)
   fuzz [TARGET] [SECONDS]      run libFuzzer on one target or all, 60 s each
+  fuzz --coverage [TARGET]...  what the corpora reach of their decoders: branches and lines, as a table
   docs                         check the links and file names in README.md and docs/; make the API reference in build/docs
   bless REASON                 accept the current scenario results as the new pinned ones
   trace-diff A B               name the first difference of two step traces
@@ -267,6 +268,13 @@ verb_faults() {
 # ---------------------------------------------------------------------------------------------------- fuzz
 
 verb_fuzz() {
+  if [ "${1:-}" = --coverage ]; then
+    verb_setup run develop
+    timed "configure fuzz_coverage" cmake --preset fuzz_coverage --log-level=WARNING
+    timed "build the replays" cmake --build build/fuzz_coverage -j "$jobs" --target prescene_fuzzers
+    tools/fuzz_coverage build/fuzz_coverage "${@:2}"
+    return
+  fi
   local target=${1:-all} seconds=${2:-60} targets=() name
   verb_setup run develop
   timed "configure fuzz" cmake --preset fuzz --log-level=WARNING

@@ -20,6 +20,8 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/interfaces/ros_messages/schemas.h"
+#include "prescene/service/training/proposals_file.h"
+#include "tests/interfaces/bags/db3_files.h"
 #include "tests/interfaces/images/rvl_coder.h"
 #include "tests/interfaces/ros_messages/schema_walk.h"
 #include "tests/support/paths.h"
@@ -133,6 +135,76 @@ void write_recording_seed(const std::string& name, McapCompression compression, 
   }
   PRESCENE_CHECK((*writer)->close().ok());
   write_seed("mcap", name, *read_file(scratch.path() / "a", 1 << 20));
+}
+
+/// A request: which service of parameters, then the message with rmw's header before its fields.
+template <class Message>
+void write_request_seeds(std::uint8_t service, const std::string& name, const std::vector<Message>& sound) {
+  const auto with_identity = [service](std::vector<std::uint8_t> cdr) {
+    constexpr std::size_t kHeader = 4;
+    const std::vector<std::uint8_t> identity = {9, 8, 7, 6, 5, 4, 3, 2, 1, 0, 0, 0, 0, 0, 0, 0};
+    cdr.insert(cdr.begin() + kHeader, identity.begin(), identity.end());
+    cdr.insert(cdr.begin(), service);
+    return cdr;
+  };
+  const RosType& type = ros_type<Message>();
+  const tests::Schema schema = tests::parse_schema(type.name, ros2msg_schema(type));
+  const core::RandomStream stream(service + 10U, core::Purpose::kTest);
+  for (const std::endian order : {std::endian::little, std::endian::big})
+    write_seed("service_request", name + (order == std::endian::big ? "_big" : "_little"),
+               with_identity(tests::random_cdr(schema, stream, order)));
+  for (std::size_t i = 0; i < sound.size(); ++i)
+    write_seed("service_request", name + "_" + std::to_string(i), with_identity(encode_cdr(sound[i])));
+}
+
+void write_service_request_seeds() {
+  const std::vector<std::string> names = {"a.number", "a.whole", "truth", "word", "text", "row", "fixed", "none"};
+  write_request_seeds<RosListParametersRequest>(0, "list", {{{}, 0}, {{"a", "truth"}, 1}});
+  write_request_seeds<RosGetParametersRequest>(1, "get", {{names}});
+  write_request_seeds<RosGetParameterTypesRequest>(2, "types", {{names}});
+  write_request_seeds<RosDescribeParametersRequest>(3, "describe", {{names}});
+  std::vector<RosParameter> set;
+  for (const std::string& name : names)
+    for (const std::uint8_t type : {1, 2, 3, 4, 8}) {
+      RosParameterValue value;
+      value.type = type;
+      value.bool_value = true;
+      value.integer_value = 1;
+      value.double_value = 0.25;
+      value.string_value = "error";
+      value.double_array_value = {1.0, 2.0};
+      set.push_back({name, value});
+    }
+  write_request_seeds<RosSetParametersRequest>(4, "set", {{set}});
+  const std::vector<RosParameter> allowed = {set[2], set[6], set[10], set[18], set[23], set[29]};
+  write_request_seeds<RosSetParametersAtomicallyRequest>(5, "set_atomically", {{allowed}, {set}});
+}
+
+void write_proposals_seeds() {
+  filter::LearnedProposals proposals;
+  write_seed("proposals", "empty", service::encode_proposals(proposals));
+  for (const int patches : {1, 3}) {
+    filter::LearnedModel& model = proposals.models.emplace_back();
+    model.name = "model_" + std::to_string(patches);
+    model.rests = {{{0.0F, 0.0F, 1.0F}, 0.75F}, {{1.0F, 0.0F, 0.0F}, 0.25F}};
+    model.patches.resize(static_cast<std::size_t>(patches));
+    model.X_AO.resize(static_cast<std::size_t>(patches));
+    for (filter::SurfacePatch& patch : model.patches) patch.relief.fill(static_cast<std::uint8_t>(100 + patches));
+  }
+  write_seed("proposals", "models", service::encode_proposals(proposals));
+  proposals.fit.trees.resize(1);
+  write_seed("proposals", "tree", service::encode_proposals(proposals));
+}
+
+void write_bag_metadata_seeds() {
+  write_seed("bag_metadata", "mcap", tests::bag_metadata("mcap", {"a.mcap"}, 1));
+  write_seed("bag_metadata", "db3", tests::bag_metadata("sqlite3", {"b.db3"}, 1));
+  write_seed("bag_metadata", "both", tests::bag_metadata("mcap", {"a.mcap", "bag/b.db3"}, 2));
+  write_seed("bag_metadata", "outside", tests::bag_metadata("mcap", {"../out.mcap"}, 1));
+  std::string packed = tests::bag_metadata("mcap", {"a.mcap"}, 1);
+  packed.replace(packed.find("compression_format: \"\""), 22, "compression_format: zstd");
+  packed.replace(packed.find("compression_mode: \"\""), 20, "compression_mode: MESSAGE");
+  write_seed("bag_metadata", "packed", packed);
 }
 
 /// Programs for frames_fuzz.cc: a byte says what comes, and each of its values takes one or more.
@@ -290,5 +362,8 @@ int main(int argc, char** argv) {
   write_message_seeds<RosDiagnosticArray>("diagnostics");
   write_sound_messages();
   write_frames_seeds();
+  write_service_request_seeds();
+  write_proposals_seeds();
+  write_bag_metadata_seeds();
   return 0;
 }
