@@ -10,6 +10,7 @@
 #include "json_motion.h"
 #include "json_relations.h"
 #include "json_values.h"
+#include "json_view.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/check.h"
@@ -150,8 +151,11 @@ struct QueryJson {
             {"detail", detail_json(stability.detail)}};
   }
   Json operator()(const ViewQuery& view) const {
-    return {{"actions", actions_json(view.actions)}, {"time", view.time}};
+    Json json{{"actions", actions_json(view.actions)}};
+    add_view_question(view, json);
+    return json;
   }
+  Json operator()(const NextViewQuery& next) const { return next_view_json(next); }
   Json operator()(const AchieveQuery& achieve) const {
     Json json = achieve_json(achieve);
     if (achieve.duration) json["duration"] = *achieve.duration;
@@ -162,7 +166,8 @@ struct QueryJson {
   Json operator()(const TimelineQuery& timeline) const { return timeline_question_json(timeline); }
 };
 
-const std::vector<std::string> kTasks{"where", "predict", "stability", "view", "achieve", "relations", "timeline"};
+const std::vector<std::string> kTasks{"where",   "predict",   "stability", "view",
+                                      "achieve", "relations", "timeline",  "next_view"};
 
 PredictQuery predict_from(JsonObject& fields) {
   PredictQuery predict;
@@ -189,9 +194,8 @@ StabilityQuery stability_from(JsonObject& fields) {
 }
 
 ViewQuery view_from(JsonObject& fields) {
-  ViewQuery view;
+  ViewQuery view = view_question_from(fields);
   view.actions = actions_from(fields);
-  read_number(fields, "time", kViewTimes, view.time);
   return view;
 }
 
@@ -200,16 +204,6 @@ AchieveQuery achieve_query_from(JsonObject& fields) {
   achieve.duration = read_number(fields, "duration", kDurations);
   if (const auto at = fields.find("effort")) achieve.effort = effort_from(*at, achieve.effort);
   return achieve;
-}
-
-// Rows from the top without padding, little-endian, in base64; `encoding` as in ROS.
-template <class Pixel>
-Json image_json(const geometry::Image<Pixel>& image, const char* encoding) {
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(image.data());
-  return {{"width", image.width()},
-          {"height", image.height()},
-          {"encoding", encoding},
-          {"base64", core::base64({bytes, image.size() * sizeof(Pixel)})}};
 }
 
 Json estimate_json(const ObjectEstimate& estimate) {
@@ -276,11 +270,8 @@ struct AnswerJson {
     add_basis(stability, json);
     return json;
   }
-  Json operator()(const ViewAnswer& view) const {
-    return {{"depth", image_json(view.depth, "32FC1")},  {"labels", image_json(view.labels, "16UC1")},
-            {"label_names", view.label_names},           {"presence", image_json(view.presence, "32FC1")},
-            {"failed_instances", view.failed_instances}, {"remarks", view.remarks}};
-  }
+  Json operator()(const ViewAnswer& view) const { return view_answer_json(view); }
+  Json operator()(const NextViewAnswer& next) const { return next_view_answer_json(next); }
   Json operator()(const AchieveAnswer& achieve) const { return achieve_answer_json(achieve); }
   Json operator()(const RelationsAnswer& relations) const { return relations_answer_json(relations); }
   Json operator()(const TimelineAnswer& timeline) const { return timeline_answer_json(timeline); }
@@ -317,6 +308,7 @@ core::Result<Query> query_from_json(std::string_view text) {
       if (what->first == "achieve") query.what = achieve_query_from(fields);
       if (what->first == "relations") query.what = relations_from(fields);
       if (what->first == "timeline") query.what = timeline_question_from(fields);
+      if (what->first == "next_view") query.what = next_view_from(fields);
     }
   }
   if (!errors.ok()) return errors.status();

@@ -26,6 +26,27 @@ Status check_text(const std::string& text, std::size_t most, const char* what) {
   return {};
 }
 
+Status check_draws(int draws) {
+  if (draws >= kFewestViewDraws && draws <= kMostViewDraws) return {};
+  return core::invalid_input("draws: " + std::to_string(draws) + " is out of range: give " +
+                             std::to_string(kFewestViewDraws) + " to " + std::to_string(kMostViewDraws));
+}
+
+Status check_camera_pose(const Pose& X_WC) {
+  if (!X_WC.translation.allFinite() || X_WC.translation.cwiseAbs().maxCoeff() > kLengthRange.high)
+    return core::invalid_input("a position out of range: " + std::string(kLengthRange.remedy));
+  if (!(std::abs(X_WC.rotation.norm() - 1.0) < 1e-6))
+    return core::invalid_input("a rotation that is none: give a quaternion of length 1");
+  return {};
+}
+
+Status check_intrinsics(const geometry::PinholeCamera& camera) {
+  PRESCENE_RETURN_IF_ERROR(geometry::validate(camera));
+  if (std::int64_t{camera.width} * camera.height <= kMostViewPixels) return {};
+  return core::resource_exhausted(std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+                                  " pixels: give at most " + std::to_string(kMostViewPixels) + " in all");
+}
+
 /// Counts what is judged.
 struct Judged {
   std::size_t outcomes = 0, conditions = 0;
@@ -71,7 +92,24 @@ struct QueryCheck {
   }
   Status operator()(const ViewQuery& view) const {
     PRESCENE_RETURN_IF_ERROR(check_count(view.actions.size(), kMostActions, "actions"));
+    PRESCENE_RETURN_IF_ERROR(check_draws(view.draws));
+    if (view.X_WC) PRESCENE_RETURN_IF_ERROR(check_camera_pose(*view.X_WC).at("pose"));
+    if (view.intrinsics) PRESCENE_RETURN_IF_ERROR(check_intrinsics(*view.intrinsics).at("intrinsics"));
     return check_number(view.time, kViewTimes).at("time");
+  }
+  Status operator()(const NextViewQuery& next) const {
+    PRESCENE_RETURN_IF_ERROR(check_text(next.object, kLongestName, "object: the name"));
+    if (next.views.empty()) return core::invalid_input("views: there is none: give the camera poses to choose from");
+    PRESCENE_RETURN_IF_ERROR(check_count(next.views.size(), kMostViews, "views"));
+    for (std::size_t i = 0; i < next.views.size(); ++i) {
+      const std::string place = "views[" + std::to_string(i) + "]";
+      const CandidateView& view = next.views[i];
+      PRESCENE_RETURN_IF_ERROR(check_text(view.name, kLongestName, "the name").at(place));
+      PRESCENE_RETURN_IF_ERROR(check_camera_pose(view.X_WC).at(place + ".pose"));
+      if (view.intrinsics) PRESCENE_RETURN_IF_ERROR(check_intrinsics(*view.intrinsics).at(place + ".intrinsics"));
+    }
+    PRESCENE_RETURN_IF_ERROR(check_draws(next.draws));
+    return check_number(next.confidence, kConfidences).at("confidence");
   }
   Status operator()(const AchieveQuery& achieve) const;
   Status operator()(const RelationsQuery& relations) const {

@@ -85,7 +85,13 @@ Prior prior_of(const belief::Belief& belief) {
               core::RandomStream(belief.seed, core::Purpose::kStartBelief, belief.step),
               belief.X_WC,
               true,
-              std::move(left_out)};
+              std::move(left_out),
+              {},
+              {}};
+  for (const belief::ObjectBelief& object : present->objects) {
+    prior.existence.push_back(object.existence);
+    prior.colors.push_back(object.colors.shares);
+  }
   const auto seating = std::make_shared<const Seating>(*present, *scene);
   prior.starts = simulation::start_of(std::shared_ptr<const belief::Belief>(std::move(present)));
   if (!seating->any() && scene->joints.empty()) return prior;
@@ -116,7 +122,9 @@ Prior prior_of(const std::shared_ptr<const belief::Scene>& scene, std::uint64_t 
               core::RandomStream(seed, core::Purpose::kStartBelief),
               scene->camera ? scene->camera->X_WC : belief::Pose{},
               false,
-              {}};
+              {},
+              std::vector<double>(scene->objects.size(), 1.0),
+              std::vector<std::shared_ptr<const std::vector<belief::ColorShare>>>(scene->objects.size())};
   return prior;
 }
 

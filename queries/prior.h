@@ -24,6 +24,9 @@ struct Prior {
   belief::Pose X_WC;
   bool seen = false;                  ///< From a belief: the scene's own actions are past.
   std::vector<std::string> left_out;  ///< Names of the scene's outcomes and groups that can't be judged.
+  std::vector<double> existence;      ///< By object: the probability that it is there, [0, 1].
+  /// By object: what frames showed of its colours; null = nothing.
+  std::vector<std::shared_ptr<const std::vector<belief::ColorShare>>> colors;
 };
 
 /// Whether the object takes part in what is foreseen.

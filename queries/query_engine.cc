@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "achieve.h"
+#include "next_view.h"
 #include "predict.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/check.h"
@@ -45,6 +46,18 @@ auto within_time(const belief::Effort& effort, const QueryContext& context, cons
   return task(limited);
 }
 
+/// Of a belief, also where its prior would leave the object out.
+template <class MakePrior>
+core::Result<belief::NextViewAnswer> looked_for(const belief::Belief& belief, const belief::NextViewQuery& query,
+                                                const QueryContext& context, const MakePrior&) {
+  return next_view(belief, query, context);
+}
+template <class MakePrior>
+core::Result<belief::NextViewAnswer> looked_for(const belief::Scene&, const belief::NextViewQuery& query,
+                                                const QueryContext& context, const MakePrior& make_prior) {
+  return next_view(make_prior(), query, context);
+}
+
 /// `make_prior` is called for what needs one, `ask_relations` for relations; `known` is the belief or the scene.
 template <class Known, class MakePrior, class AskRelations>
 void dispatch(const Known& known, const belief::Query& query, const QueryContext& context, const MakePrior& make_prior,
@@ -73,6 +86,8 @@ void dispatch(const Known& known, const belief::Query& query, const QueryContext
           put(ask_relations(what), answer);
         else if constexpr (std::is_same_v<Asked, belief::TimelineQuery>)
           put(observed(known, what, context), answer);
+        else if constexpr (std::is_same_v<Asked, belief::NextViewQuery>)
+          put(looked_for(known, what, context, make_prior), answer);
         else
           put(view(make_prior(), what, context), answer);
       },

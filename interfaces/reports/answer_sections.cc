@@ -115,6 +115,18 @@ std::vector<ReportSection> sections_of(const belief::RelationsAnswer& answer, co
   return {std::move(section)};
 }
 
+std::vector<ReportSection> sections_of(const belief::NextViewAnswer& answer, const belief::Scene&) {
+  TableBlock table;
+  table.caption = "expected reduction of the entropy, nats, of " + decimal(answer.entropy, 3) + " now";
+  table.columns = {"candidate", "reduction", "low", "high"};
+  for (const belief::NextViewAnswer::View& view : answer.views)
+    table.rows.push_back({view.name.empty() ? std::to_string(view.index + 1) : view.name, decimal(view.reduction, 3),
+                          decimal(view.low, 3), decimal(view.high, 3)});
+  ReportSection section{"Where to look next", {std::move(table)}};
+  for (const std::string& remark : answer.remarks) section.blocks.push_back(TextBlock{remark});
+  return {std::move(section)};
+}
+
 std::vector<ReportSection> sections_of(const belief::TimelineAnswer& answer, const belief::Scene&) {
   const belief::ObservedTimeline& timeline = answer.timeline;
   const auto since_first = [&](core::TimeNs stamp_ns) {

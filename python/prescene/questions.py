@@ -54,7 +54,8 @@ def ask(
     threads: int = 0,
     stepper: str = "automatic",
 ) -> Dict[str, Any]:
-    """Asks anything that can be asked over the bus: {"where": {}}, {"predict": ...}, "stability", "achieve", "view".
+    """Asks anything that can be asked over the bus: {"where": {}}, {"predict": ...}, "stability", "achieve", "view",
+    "next_view".
 
     `about` is a scene, whose distributions are then the start, or a frame of a replay, whose belief is. `seed` (default
     1) is for scenes only: a frame has its replay's. Returns the answer as docs/reference/queries.md describes it.

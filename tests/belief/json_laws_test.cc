@@ -241,5 +241,21 @@ TEST(AnswerToJson, WritesImagesInBase64) {
   EXPECT_EQ(json["depth"]["encoding"], "32FC1");
 }
 
+TEST(AnswerToJson, WritesCompactImagesInWholeNumbers) {
+  ViewAnswer view;
+  view.compact = true;
+  view.depth = geometry::DepthImage(1, 1, 0.513F);            // 513 mm = 01 02 in little-endian order
+  view.depth_deviation = geometry::DepthImage(1, 1, 100.0F);  // more than 16 bits hold
+  view.presence = geometry::Image<float>(1, 1, 1.0F);
+  const Json json = to_json(Answer{"", 0, {}, view})["view"];
+  EXPECT_EQ(json["depth"]["encoding"], "16UC1");
+  EXPECT_EQ(json["depth"]["scale"], 0.001);
+  EXPECT_EQ(json["depth"]["base64"], "AQI=");
+  EXPECT_EQ(json["depth_deviation"]["base64"], "//8=");
+  EXPECT_EQ(json["presence"]["encoding"], "mono8");
+  EXPECT_EQ(json["presence"]["base64"], "/w==");
+  EXPECT_FALSE(json.contains("color"));
+}
+
 }  // namespace
 }  // namespace prescene::belief

@@ -148,5 +148,22 @@ TEST(ExplainQuestion, NamesWhatIsWrongInIt) {
   EXPECT_THAT(query_from_json(R"({"explain": {}})").status().message(), HasSubstr("ask a running 'serve'"));
 }
 
+TEST(QueryFromJson, AMistakeInAQuestionAboutViewsIsNamedWithItsPlace) {
+  const std::string begin = R"({"next_view": {"object": "mug", )";
+  EXPECT_THAT(message(R"({"next_view": {"object": "mug", "views": []}})"), HasSubstr("views: there is none"));
+  EXPECT_THAT(message(begin + R"("views": [{}]}})"), HasSubstr("next_view.views[0]: the key 'pose' is missing"));
+  EXPECT_THAT(message(begin + R"("about": "colour", "views": [{"pose": {"position": [0, 0, 1]}}]}})"),
+              HasSubstr("next_view.about"));
+  EXPECT_THAT(message(begin + R"("draws": 3, "views": [{"pose": {"position": [0, 0, 1]}}]}})"),
+              HasSubstr("next_view.draws"));
+  EXPECT_THAT(message(begin + R"("views": [{"pose": {"position": [1e9, 0, 0]}}]}})"), HasSubstr("views[0].pose"));
+  const std::string large = R"("intrinsics": {"width": 16000, "height": 16000, "fx": 9})";
+  EXPECT_THAT(message(begin + R"("views": [{"pose": {"position": [0, 0, 1]}, )" + large + "}]}}"),
+              HasSubstr("views[0].intrinsics"));
+  EXPECT_THAT(message(R"({"view": {"detail": ["smell"]}})"), HasSubstr("view.detail[0]"));
+  EXPECT_THAT(message(R"({"view": {"intrinsics": {"width": 4, "height": 4, "fx": -1}}})"), HasSubstr("intrinsics"));
+  EXPECT_EQ(message(begin + R"("views": [{"pose": {"position": [0, 0, 1]}}]}})"), "");
+}
+
 }  // namespace
 }  // namespace prescene::belief

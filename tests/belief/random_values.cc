@@ -196,7 +196,7 @@ Query random_query(RandomStream& stream) {
   Effort effort{stream.uniform(0.001, 0.1), stream.uniform(0.5, 0.999), 1 + random_below(stream, 9999), {}, {}};
   if (random_below(stream, 2) == 1) effort.max_seconds = stream.uniform(0.1, 10.0);
   if (random_below(stream, 2) == 1) effort.exact_instances = 1 + random_below(stream, 1000);
-  switch (random_below(stream, 5)) {
+  switch (random_below(stream, 6)) {
     case 0: {
       WhereQuery where;
       if (random_below(stream, 2) == 1) where.object = "block";
@@ -246,10 +246,30 @@ Query random_query(RandomStream& stream) {
       query.what = achieve;
       break;
     }
+    case 4: {
+      NextViewQuery next;
+      next.object = "block";
+      next.about = static_cast<ViewAbout>(random_below(stream, 3));
+      for (int i = random_below(stream, 3); i >= 0; --i) {
+        CandidateView& view = next.views.emplace_back();
+        if (i > 0) view.name = "view " + std::to_string(i);
+        view.X_WC = random_pose(stream);
+        if (random_below(stream, 2) == 1) view.intrinsics = {64, 48, 50.0, stream.uniform(40.0, 60.0), 31.0, 20.0};
+      }
+      next.draws = 16 + random_below(stream, 100);
+      next.confidence = stream.uniform(0.5, 0.999);
+      query.what = next;
+      break;
+    }
     default: {
       ViewQuery view;
       for (int i = random_below(stream, 3); i > 0; --i) view.actions.push_back(random_action(stream));
       view.time = stream.uniform(0.0, 3.0);
+      if (random_below(stream, 2) == 1) view.X_WC = random_pose(stream);
+      if (random_below(stream, 2) == 1) view.intrinsics = {64, 48, 50.0, stream.uniform(40.0, 60.0), 31.0, 20.0};
+      view.draws = 16 + random_below(stream, 100);
+      view.detail = {random_below(stream, 2) == 1, random_below(stream, 2) == 1, random_below(stream, 2) == 1};
+      view.compact = random_below(stream, 2) == 1;
       query.what = view;
     }
   }

@@ -11,10 +11,12 @@
 #include "prescene/belief/alternative_poses.h"
 #include "prescene/belief/belief.h"
 #include "prescene/belief/effort.h"
+#include "prescene/belief/next_view.h"
 #include "prescene/belief/observed_timeline.h"
 #include "prescene/belief/prediction.h"
 #include "prescene/belief/relations.h"
 #include "prescene/core/status.h"
+#include "prescene/geometry/camera.h"
 #include "prescene/geometry/image.h"
 
 namespace prescene::belief {
@@ -62,16 +64,30 @@ struct StabilityQuery {
   StabilityDetail detail = {};
   friend bool operator==(const StabilityQuery&, const StabilityQuery&) = default;
 };
-/// What will the camera see after `actions`?
+/// What an answer about a view has besides the likeliest images and the presence.
+struct ViewDetail {
+  bool spread = false;   ///< Mean depth and its standard deviation.
+  bool objects = false;  ///< The probability of each object, pixel by pixel.
+  bool color = false;    ///< The expected colour.
+  friend bool operator==(const ViewDetail&, const ViewDetail&) = default;
+};
+/// What will a camera see after `actions`?
 struct ViewQuery {
   std::vector<Action> actions;
-  double time = 1.0;  ///< s from now
+  double time = 1.0;                                  ///< s from now
+  std::optional<Pose> X_WC;                           ///< Empty: where the scene's camera was seen last.
+  std::optional<geometry::PinholeCamera> intrinsics;  ///< Empty: those of the scene's camera.
+  int draws = 64;                                     ///< Predicted states that are averaged over.
+  ViewDetail detail;
+  bool compact = false;  ///< Images in 8 and 16 bits: see ViewAnswer.
   friend bool operator==(const ViewQuery&, const ViewQuery&) = default;
 };
 
 struct Query {
   std::string id;  ///< Given back in the answer.
-  std::variant<WhereQuery, PredictQuery, StabilityQuery, ViewQuery, AchieveQuery, RelationsQuery, TimelineQuery> what;
+  std::variant<WhereQuery, PredictQuery, StabilityQuery, ViewQuery, AchieveQuery, RelationsQuery, TimelineQuery,
+               NextViewQuery>
+      what;
   friend bool operator==(const Query&, const Query&) = default;
 };
 
@@ -139,10 +155,33 @@ struct StabilityAnswer : Basis {
   friend bool operator==(const StabilityAnswer&, const StabilityAnswer&) = default;
 };
 struct ViewAnswer {
+  /// Of one object.
+  struct ObjectShare {
+    std::string object;
+    double existence = 1.0;
+    geometry::Image<float> probability;  ///< That a pixel shows it.
+    friend bool operator==(const ObjectShare&, const ObjectShare&) = default;
+  };
+  /// Where the colour of a thing is from.
+  struct ColorSource {
+    std::string name;
+    std::string from;  ///< "texture", "model" (one colour), "learned" (from frames), or "" = it is not known.
+    friend bool operator==(const ColorSource&, const ColorSource&) = default;
+  };
   geometry::DepthImage depth;  ///< Of the most likely particle.
   geometry::LabelImage labels;
   std::vector<std::string> label_names;
   geometry::Image<float> presence;  ///< Probability per pixel that some object is there.
+  /// Where asked for. Mean and standard deviation are of the states in which the pixel shows anything; 0 where it does
+  /// in fewer than half of them.
+  std::optional<geometry::DepthImage> mean_depth, depth_deviation;
+  std::vector<ObjectShare> objects;  ///< Where asked for.
+  /// Where asked for: sRGB, the mean in linear light of the states in which the pixel shows something of known colour;
+  /// black where it does in fewer than half of them. Missing if no colour is known of anything.
+  std::optional<geometry::ColorImage> color;
+  std::vector<ColorSource> color_sources;  ///< Where colour was asked for: of each thing in label_names.
+  /// In JSON, depths are in mm, deviations in 0.1 mm (16 bits) and probabilities in 1/255 (8 bits).
+  bool compact = false;
   /// Foreseen states that `presence` would be averaged over and that blew up in the simulator; it is that of the
   /// others.
   int failed_instances = 0;
@@ -156,7 +195,7 @@ struct Answer {
   std::uint64_t step = 0;  ///< Of the belief that was asked.
   core::Status error;      ///< Not ok: could not be answered, and why.
   std::variant<std::monostate, WhereAnswer, PredictAnswer, StabilityAnswer, ViewAnswer, AchieveAnswer, RelationsAnswer,
-               TimelineAnswer>
+               TimelineAnswer, NextViewAnswer>
       what;
 
   friend bool operator==(const Answer&, const Answer&) = default;

@@ -6,6 +6,7 @@
 //   PRESCENE_RETURN_IF_ERROR(belief::validate(query));
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "prescene/belief/query.h"
@@ -31,6 +32,12 @@ inline constexpr ScalarRange kTurnsDeg{6e-5, 183.0, "give degrees between 6e-05 
 inline constexpr ScalarRange kReaches{1e-3, 1e3, "give metres between 0.001 and 1000"};
 /// Of RelationsQuery: with fewer no interval says much.
 inline constexpr int kFewestRelationDraws = 16, kMostRelationDraws = 4096;
+/// Of ViewQuery, and of NextViewQuery, where each draw is compared with each other.
+inline constexpr int kFewestViewDraws = 16, kMostViewDraws = 256;
+/// Of NextViewQuery.
+inline constexpr std::size_t kMostViews = 64;
+/// Pixels of a view that is asked for, at most.
+inline constexpr std::int64_t kMostViewPixels = std::int64_t{1} << 22;
 inline constexpr ScalarRange kWantedProbabilities{0.5, 0.999, "give a probability between 0.5 and 0.999, like 0.95"};
 inline constexpr int kMostPaths = 1000;
 inline constexpr std::size_t kMostFree = 16;

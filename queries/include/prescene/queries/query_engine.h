@@ -7,10 +7,10 @@
 //   belief::Answer answer = queries::answer(*snapshot, query, context);
 //   if (!answer.error.ok()) ...
 //
-// Questions of seven kinds (belief::Query): `where` is everything, how are things related now (`relations`) and in
+// Questions of eight kinds (belief::Query): `where` is everything, how are things related now (`relations`) and in
 // what was observed (`timeline`): actual belief; what happens if (`predict`), does it stay (`stability`): state
-// anticipation; what will the camera see (`view`): observation anticipation; how must it be done, so that an outcome
-// comes about (`achieve`): state explanation. docs/reference/queries.md says what the answers mean.
+// anticipation; what will the camera see (`view`), and from where would it see what is not known yet (`next_view`):
+// observation anticipation; how must it be done, so that an outcome comes about (`achieve`): state explanation. docs/reference/queries.md says what the answers mean.
 #pragma once
 
 #include <cstddef>
@@ -31,14 +31,14 @@ namespace prescene::queries {
 
 /// What answering takes; made by whoever chooses backends.
 struct QueryContext {
-  /// Of the scene to simulate: the belief's, with its objects where the belief has them. Needed by all but `where`;
+  /// Of the scene to simulate: the belief's, with its objects where the belief has them. Needed by all but `where` and `next_view`;
   /// steps of another length only where PredictDetail::model_error is asked for.
   simulation::SimulatorFactory make_simulator;
   /// MechanicsOptions::edge_rounding of those simulators, m.
   double edge_rounding = simulation::MechanicsOptions{}.edge_rounding;
   /// Where shapes are kept over queries; null: answers have no belief::FlightForecast.
   simulation::ShapeStore* shapes = nullptr;
-  /// Needed by `view`; called once a query.
+  /// Needed by `view` and `next_view`; called once a query.
   std::function<core::Result<std::unique_ptr<rendering::Renderer>>()> make_renderer;
   /// Never null. Its number of threads does not change answers.
   core::ThreadPool* pool = nullptr;

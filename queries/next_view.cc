@@ -1,0 +1,414 @@
+// SPDX-License-Identifier: Apache-2.0
+// Hypotheses about one object, and circumstances: where all else is, and by how much the object is off. Each hypothesis
+// is looked at under the same circumstances, so that only what distinguishes the hypotheses makes images differ.
+#include "next_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "prescene/filter/proposals/frame.h"
+#include "prescene/rendering/sensor/pixel_grid.h"
+#include "view_information.h"
+
+namespace prescene::queries {
+namespace {
+
+using belief::Pose;
+using belief::ViewAbout;
+using geometry::Vector3d;
+
+// As alternatives of `where` (prescene/belief/alternative_poses.h).
+constexpr double kOnePlaceRadius = 0.05, kOneTurnAngle = 0.5236, kLeastShare = 0.01;
+constexpr std::size_t kMostPlaces = 8;
+constexpr std::size_t kFewestCircumstances = 2;
+constexpr double kFewestTemperingPixels = 12.0;  // as of the filter's weights
+
+struct StateDraw {
+  belief::WorldState state;
+  double weight = 0.0;
+};
+
+/// Each component of the start has its share of the draws.
+std::vector<StateDraw> draw_states(const Prior& prior, int count) {
+  std::vector<StateDraw> draws;
+  double all = 0.0;
+  for (const simulation::StartComponent& component : prior.starts.components) all += component.weight;
+  const std::vector<simulation::StartSampler> samplers = simulation::samplers_of(prior.starts, prior.stream);
+  for (std::size_t c = 0; c < samplers.size(); ++c) {
+    const double share = prior.starts.components[c].weight / all;
+    const auto own = static_cast<std::uint32_t>(std::max(1L, std::lround(share * count)));
+    for (std::uint32_t i = 0; i < own; ++i) draws.push_back({samplers[c].draw(i), share / own});
+  }
+  return draws;
+}
+
+/// A turn and a shift along the axes of W.
+struct Offset {
+  Vector3d turn = Vector3d::Zero(), shift = Vector3d::Zero();
+};
+Pose moved_by(const Pose& X, const Offset& off) {
+  return {(geometry::exp_rotation(off.turn) * X.rotation).normalized(), X.translation + off.shift};
+}
+Offset offset_between(const Pose& X, const Pose& X_from) {
+  return {geometry::log_rotation(X.rotation * X_from.rotation.conjugate()), X.translation - X_from.translation};
+}
+
+struct WeightedPose {
+  Pose X_WO;
+  double weight = 0.0;
+};
+
+/// Poses that are about one, up to symmetry.
+struct Place {
+  Pose X_WO;  ///< Their mean.
+  double weight = 0.0;
+};
+
+/// The heaviest first; weights sum to 1.
+std::vector<Place> places_of(std::vector<WeightedPose> poses, const geometry::SymmetryGroup& symmetry) {
+  struct Group {
+    Pose X_leader;
+    double weight = 0.0;
+    Offset sum;  // weighted, from the leader
+  };
+  std::ranges::stable_sort(poses, std::ranges::greater(), &WeightedPose::weight);
+  std::vector<Group> groups;
+  for (const WeightedPose& pose : poses) {
+    Group* found = nullptr;
+    Offset off;
+    for (Group& group : groups) {
+      off = offset_between(geometry::closest_equivalent(pose.X_WO, group.X_leader, symmetry), group.X_leader);
+      if (off.shift.norm() > kOnePlaceRadius || off.turn.norm() > kOneTurnAngle) continue;
+      found = &group;
+      break;
+    }
+    if (found == nullptr) {
+      found = &groups.emplace_back(Group{pose.X_WO, 0.0, {}});
+      off = {};
+    }
+    found->weight += pose.weight;
+    found->sum.turn += pose.weight * off.turn;
+    found->sum.shift += pose.weight * off.shift;
+  }
+  std::ranges::stable_sort(groups, std::ranges::greater(), &Group::weight);
+  while (groups.size() > 1 && (groups.size() > kMostPlaces || groups.back().weight < kLeastShare)) groups.pop_back();
+  double all = 0.0;
+  for (const Group& group : groups) all += group.weight;
+  std::vector<Place> places;
+  for (const Group& group : groups)
+    places.push_back({moved_by(group.X_leader, {group.sum.turn / group.weight, group.sum.shift / group.weight}),
+                      group.weight / all});
+  return places;
+}
+
+/// By how much each draw is off the place that it is nearest to; the mean over the draws of a place is 0.
+std::vector<Offset> offsets_from(const std::vector<Place>& places, const std::vector<StateDraw>& draws,
+                                 std::size_t object, const geometry::SymmetryGroup& symmetry) {
+  std::vector<Offset> offsets;
+  std::vector<std::size_t> place_of;
+  std::vector<Offset> sums(places.size());
+  std::vector<double> weights(places.size(), 0.0);
+  for (const StateDraw& draw : draws) {
+    const Pose& X_WO = draw.state.objects[object].X_WO;
+    double least = std::numeric_limits<double>::infinity();
+    Offset nearest;
+    std::size_t at = 0;
+    for (std::size_t p = 0; p < places.size(); ++p) {
+      const Offset off = offset_between(geometry::closest_equivalent(X_WO, places[p].X_WO, symmetry), places[p].X_WO);
+      const double distance = off.shift.norm() / kOnePlaceRadius + off.turn.norm() / kOneTurnAngle;
+      if (distance >= least) continue;
+      least = distance;
+      nearest = off;
+      at = p;
+    }
+    offsets.push_back(nearest);
+    place_of.push_back(at);
+    sums[at].turn += draw.weight * nearest.turn;
+    sums[at].shift += draw.weight * nearest.shift;
+    weights[at] += draw.weight;
+  }
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    const std::size_t at = place_of[i];
+    offsets[i].turn -= sums[at].turn / weights[at];
+    offsets[i].shift -= sums[at].shift / weights[at];
+  }
+  return offsets;
+}
+
+/// One state of the world as it is drawn.
+struct Imagined {
+  belief::WorldState state;
+  std::vector<char> is_there;  ///< By object.
+};
+
+/// What is to be told apart, under which circumstances: states[h * circumstances + j].
+struct Imagining {
+  std::vector<belief::NextViewAnswer::Hypothesis> hypotheses;
+  std::vector<double> probabilities;
+  std::size_t circumstances = 1;
+  std::vector<Imagined> states;
+
+  void add(std::optional<Pose> X_WO, double probability) {
+    hypotheses.push_back({X_WO, probability});
+    probabilities.push_back(probability);
+  }
+};
+
+/// So many of the draws, equally likely, spread over all of them.
+std::vector<std::size_t> thinned(const std::vector<StateDraw>& draws, std::size_t count) {
+  std::vector<std::size_t> chosen;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < draws.size(); ++i) {
+    sum += draws[i].weight;
+    while (chosen.size() < count && (static_cast<double>(chosen.size()) + 0.5) / static_cast<double>(count) <= sum)
+      chosen.push_back(i);
+  }
+  while (chosen.size() < count) chosen.push_back(draws.size() - 1);
+  return chosen;
+}
+
+/// `particles`: of the object; empty = its places are those of the draws.
+Imagining imagine(const Prior& prior, std::size_t object, const belief::NextViewQuery& query,
+                  std::span<const belief::Particle> particles) {
+  const std::vector<StateDraw> draws = draw_states(prior, query.draws);
+  const auto asked = static_cast<std::size_t>(query.draws);
+  Imagining result;
+  if (query.about == ViewAbout::kPose) {
+    for (const StateDraw& draw : draws) {
+      result.add(draw.state.objects[object].X_WO, draw.weight);
+      Imagined& one = result.states.emplace_back(Imagined{prior.likeliest, {}});
+      one.state.objects[object] = draw.state.objects[object];
+      one.is_there.assign(prior.existence.size(), 1);
+    }
+    return result;
+  }
+  const geometry::SymmetryGroup& symmetry = prior.scene->model_of(prior.scene->objects[object]).symmetry;
+  // Means of particles are known exactly, those of draws are not: their noise would tell places apart that look alike.
+  std::vector<WeightedPose> poses;
+  for (const belief::Particle& particle : particles) poses.push_back({particle.X_WO, std::exp(particle.log_weight)});
+  if (poses.empty())
+    for (const StateDraw& draw : draws) poses.push_back({draw.state.objects[object].X_WO, draw.weight});
+  const std::vector<Place> places = places_of(std::move(poses), symmetry);
+  const bool of_existence = query.about == ViewAbout::kExistence;
+  if (of_existence) {
+    result.add(places.front().X_WO, prior.existence[object]);
+    result.add(std::nullopt, 1.0 - prior.existence[object]);
+  } else {
+    for (const Place& place : places) result.add(place.X_WO, place.weight);
+  }
+  result.circumstances = std::max(kFewestCircumstances, asked / result.hypotheses.size());
+  const std::vector<std::size_t> chosen = thinned(draws, result.circumstances);
+  const std::vector<Offset> offsets = offsets_from(places, draws, object, symmetry);
+  for (std::size_t h = 0; h < result.hypotheses.size(); ++h) {
+    for (std::size_t j = 0; j < chosen.size(); ++j) {
+      core::RandomStream chance = prior.stream.for_purpose(core::Purpose::kScenario).at(j);
+      Imagined& one = result.states.emplace_back(Imagined{draws[chosen[j]].state, {}});
+      for (const double existence : prior.existence) one.is_there.push_back(chance.uniform() < existence ? 1 : 0);
+      one.is_there[object] = result.hypotheses[h].X_WO ? 1 : 0;
+      // Where it is, if it is there, belongs to the circumstances of its existence.
+      if (!of_existence) one.state.objects[object].X_WO = moved_by(*result.hypotheses[h].X_WO, offsets[chosen[j]]);
+    }
+  }
+  return result;
+}
+
+/// Draws what a camera would see.
+class ImageMaker {
+ public:
+  ImageMaker(const Prior& prior, const QueryContext& context, rendering::Renderer& renderer,
+             const rendering::SensorModelOptions& sensor)
+      : prior_(prior), meshes_(context.meshes != nullptr ? *context.meshes : own_meshes_), renderer_(renderer) {
+    options_.near_depth = sensor.min_depth;
+    options_.far_depth = sensor.max_depth;
+    options_.normals = true;
+    for (const belief::KinematicBody& body : prior.scene->robot) X_WG_.push_back(belief::pose_at(body, 0.0));
+    for (const belief::SceneObject& object : prior.scene->objects) {
+      const belief::ObjectModel& model = prior.scene->model_of(object);
+      materials_.push_back(filter::material_of(model.surface, model.color));
+    }
+  }
+
+  const std::vector<rendering::SurfaceMaterial>& materials() const { return materials_; }
+
+  /// `covered` gets how many pixels show the object `of`.
+  core::Result<ExpectedImage> image(const Imagined& imagined, const geometry::PinholeCamera& camera, const Pose& X_WC,
+                                    std::size_t of, double* covered) {
+    filter::BeliefView view =
+        filter::render_scene(*prior_.scene, imagined.state, X_WG_, filter::MeshDetail::kLikelihood, meshes_);
+    std::vector<int> object_of;  // by label - 1; -1 = surroundings
+    rendering::RenderScene scene;
+    for (std::size_t i = 0; i < view.scene.instances.size(); ++i) {
+      const bool is_object = view.kinds[i] == filter::InstanceKind::kObject;
+      if (is_object && imagined.is_there[i] == 0) continue;
+      scene.instances.push_back(view.scene.instances[i]);
+      object_of.push_back(is_object ? static_cast<int>(i) : -1);
+    }
+    return drawn(scene, object_of, camera, X_WC, of, covered);
+  }
+
+  core::Result<ExpectedImage> surroundings(const geometry::PinholeCamera& camera, const Pose& X_WC) {
+    const filter::BeliefView view =
+        filter::known_surroundings(*prior_.scene, X_WG_, filter::MeshDetail::kSurroundings, meshes_);
+    return drawn(view.scene, std::vector<int>(view.scene.instances.size(), -1), camera, X_WC, 0, nullptr);
+  }
+
+ private:
+  core::Result<ExpectedImage> drawn(const rendering::RenderScene& scene, const std::vector<int>& object_of,
+                                    const geometry::PinholeCamera& camera, const Pose& X_WC, std::size_t of,
+                                    double* covered) {
+    PRESCENE_RETURN_IF_ERROR(renderer_.render(scene, camera, X_WC, options_, &images_));
+    ExpectedImage image(camera.width, camera.height);
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const std::uint16_t label = images_.labels(x, y);
+        if (label == 0) continue;
+        ExpectedSurface& surface = image(x, y);
+        const int object = object_of[label - 1U];
+        surface.kind = object < 0 ? ExpectedSurface::Kind::kSurroundings : ExpectedSurface::Kind::kObject;
+        surface.depth = images_.depth(x, y);
+        if (object < 0) continue;
+        if (covered != nullptr && static_cast<std::size_t>(object) == of) *covered += 1.0;
+        surface.thing = static_cast<std::uint16_t>(object);
+        const Vector3d ray = camera.unproject(x, y, 1.0).normalized();
+        surface.cosine = static_cast<float>(std::abs(images_.normals(x, y).cast<double>().dot(ray)));
+        const auto differs = [&](int u, int v) {
+          return u >= 0 && v >= 0 && u < camera.width && v < camera.height && images_.labels(u, v) != label;
+        };
+        surface.outline = differs(x - 1, y) || differs(x + 1, y) || differs(x, y - 1) || differs(x, y + 1);
+      }
+    }
+    return image;
+  }
+
+  const Prior& prior_;
+  filter::MeshCache own_meshes_;
+  filter::MeshCache& meshes_;
+  rendering::Renderer& renderer_;
+  rendering::RenderOptions options_;
+  rendering::RenderedView images_;
+  std::vector<Pose> X_WG_;
+  std::vector<rendering::SurfaceMaterial> materials_;
+};
+
+const char* what_is_asked(ViewAbout about) {
+  switch (about) {
+    case ViewAbout::kPlace:
+      return "where it is";
+    case ViewAbout::kPose:
+      return "its pose";
+    case ViewAbout::kExistence:
+      break;
+  }
+  return "whether it is there";
+}
+
+}  // namespace
+
+core::Result<belief::NextViewAnswer> next_view(const Prior& prior, const belief::NextViewQuery& query,
+                                               const QueryContext& context,
+                                               std::span<const belief::Particle> particles) {
+  const std::optional<int> found = belief::find_object(*prior.scene, query.object);
+  if (!found) return no_such_object(prior, query.object);
+  const auto object = static_cast<std::size_t>(*found);
+  if (!context.make_renderer) return core::unavailable("no renderer: this service was set up without one");
+  for (std::size_t v = 0; v < query.views.size(); ++v)
+    if (!query.views[v].intrinsics && !prior.scene->camera)
+      return core::not_found("views[" + std::to_string(v) +
+                             "]: the scene has no camera whose intrinsics could be taken: give 'intrinsics'");
+  PRESCENE_TRY(const std::unique_ptr<rendering::Renderer> renderer, context.make_renderer());
+
+  const rendering::SensorModel model(filter::with_settings({}, belief::depth_noise_of(*prior.scene, 0)));
+  const Imagining imagining = imagine(prior, object, query, particles);
+  belief::NextViewAnswer answer;
+  answer.object = query.object;
+  answer.about = query.about;
+  answer.hypotheses = imagining.hypotheses;
+  answer.entropy = entropy_of(imagining.probabilities);
+  answer.draws = static_cast<int>(imagining.states.size());
+  if (!(answer.entropy > 0.0))
+    answer.remarks.push_back(std::string("The belief has no doubt about ") + what_is_asked(query.about) +
+                             ": no view can tell more.");
+  const double deviations = core::inverse_normal_cdf(0.5 + 0.5 * query.confidence);
+  ImageMaker maker(prior, context, *renderer, model.options());
+  std::vector<ViewInformation> informations;
+  for (std::size_t v = 0; v < query.views.size(); ++v) {
+    const belief::CandidateView& view = query.views[v];
+    const geometry::PinholeCamera& full = view.intrinsics ? *view.intrinsics : prior.scene->camera->intrinsics;
+    const int step = rendering::pixel_step(full.width, rendering::FrameTermsOptions{}.target_width);
+    const geometry::PinholeCamera camera =
+        full.subsampled(step, rendering::pixel_offset(step, full.width, full.height));
+    std::vector<ExpectedImage> images;
+    double visible = 0.0, there = 0.0;
+    for (std::size_t i = 0; i < imagining.states.size(); ++i) {
+      if (context.cancellation && context.cancellation->requested())
+        return core::cancelled("stopped before all candidates were looked at: give fewer, or fewer draws");
+      double covered = 0.0;
+      PRESCENE_TRY(ExpectedImage image, maker.image(imagining.states[i], camera, view.X_WC, object, &covered));
+      images.push_back(std::move(image));
+      if (imagining.states[i].is_there[object] == 0) continue;
+      const double weight = imagining.probabilities[i / imagining.circumstances];
+      visible += weight * covered;
+      there += weight;
+    }
+    if (there > 0.0) visible /= there;
+    PRESCENE_TRY(const ExpectedImage surroundings, maker.surroundings(camera, view.X_WC));
+    const double tempering =
+        rendering::tempering(rendering::TemperingOptions{}.weight, std::max(kFewestTemperingPixels, visible), step);
+    informations.push_back(information_of({imagining.probabilities, static_cast<int>(imagining.circumstances), images,
+                                           maker.materials(), &surroundings, tempering, step},
+                                          model, prior.stream.for_purpose(core::Purpose::kSensorNoise), deviations,
+                                          *context.pool));
+    const ViewInformation& information = informations.back();
+    answer.views.push_back({view.name, static_cast<int>(v), information.reduction, information.low, information.high,
+                            static_cast<int>(std::lround(visible)), information.different_pixels});
+    if (context.progress)
+      context.progress({static_cast<double>(v + 1) / static_cast<double>(query.views.size()), std::nullopt,
+                        std::to_string(v + 1) + " of " + std::to_string(query.views.size()) + " candidates looked at"});
+  }
+  std::ranges::stable_sort(answer.views, std::ranges::greater(), &belief::NextViewAnswer::View::reduction);
+  answer.any_tells = std::ranges::any_of(answer.views, [](const auto& view) { return view.low > 0.0; });
+  if (answer.views.front().low > 0.0) {
+    answer.best_is_clear = true;
+    if (answer.views.size() > 1) {
+      // The same hypotheses and circumstances in both: differences scatter less than either.
+      const ViewInformation& best = informations[static_cast<std::size_t>(answer.views[0].index)];
+      const ViewInformation& second = informations[static_cast<std::size_t>(answer.views[1].index)];
+      std::vector<double> differences;
+      for (std::size_t i = 0; i < best.by_image.size(); ++i)
+        differences.push_back(best.by_image[i] - second.by_image[i]);
+      const MeanInterval mean = mean_interval(differences, best.weights, deviations);
+      answer.best_is_clear = mean.mean - mean.half_width > 0.0;
+    }
+  }
+  if (!answer.any_tells && answer.entropy > 0.0)
+    answer.remarks.push_back(std::string("No candidate tells anything about ") + what_is_asked(query.about) + ".");
+  return answer;
+}
+
+core::Result<belief::NextViewAnswer> next_view(const belief::Belief& belief, const belief::NextViewQuery& query,
+                                               const QueryContext& context) {
+  const std::optional<int> index = belief::find_object(belief, query.object);
+  if (!index || belief.objects[static_cast<std::size_t>(*index)].particles.empty())
+    return next_view(prior_of(belief), query, context);
+  // What is lost or probably not there takes no part otherwise; where to look for it is a question all the same.
+  belief::Belief asked = belief;
+  belief::ObjectBelief& object = asked.objects[static_cast<std::size_t>(*index)];
+  const double existence = object.existence;
+  const bool was_lost = object.state == belief::TrackState::kLost;
+  if (!filter::is_present(object)) {
+    object.existence = 1.0;
+    object.state = belief::TrackState::kTracked;
+  }
+  Prior prior = prior_of(asked);
+  if (const auto found = belief::find_object(*prior.scene, query.object))
+    prior.existence[static_cast<std::size_t>(*found)] = existence;
+  core::Result<belief::NextViewAnswer> answer = next_view(prior, query, context, object.particles);
+  if (answer && was_lost)
+    answer->remarks.push_back("'" + query.object + "' is lost: the poses are those where it was seen last.");
+  return answer;
+}
+
+}  // namespace prescene::queries
