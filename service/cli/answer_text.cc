@@ -8,6 +8,7 @@
 #include "prescene/geometry/angles.h"
 #include "relations_options.h"
 #include "verb.h"
+#include "view_options.h"
 
 namespace prescene::service {
 namespace {
@@ -130,6 +131,8 @@ std::string short_form(const nlohmann::ordered_json& answer) {
   if (const auto achieve = answer.find("achieve"); achieve != answer.end()) return achieve_text(*achieve);
   if (const auto relations = answer.find("relations"); relations != answer.end()) return relations_text(*relations);
   if (const auto timeline = answer.find("timeline"); timeline != answer.end()) return timeline_text(*timeline);
+  if (const auto next = answer.find("next_view"); next != answer.end()) return next_view_text(*next);
+  if (const auto view = answer.find("view"); view != answer.end()) return view_text(*view);
   if (const auto predict = answer.find("predict"); predict != answer.end()) {
     std::vector<std::vector<std::string>> rows = {{"outcome", "group", "probability"}};
     for (const auto& outcome : predict->at("outcomes")) {

@@ -15,6 +15,7 @@
 #include "prescene/service/outside_json.h"
 #include "relations_options.h"
 #include "verb.h"
+#include "view_options.h"
 
 namespace prescene::service {
 namespace {
@@ -32,6 +33,7 @@ struct AskOptions {
   std::optional<double> from, to, last;  // of explain, and ...
   bool change = false;                   // ... the same
   std::string wanted;
+  ViewQuestionOptions view;
   std::string scene;
   const CLI::App* verb = nullptr;
   interfaces::DdsOptions dds;
@@ -70,6 +72,15 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std:
   if (options.kind != "explain" &&
       (options.from || options.to || options.last || options.change || !options.wanted.empty()))
     return core::invalid_input("--from, --to, --last, --change and --wanted are of 'ask explain': leave them out");
+  const bool of_view = options.kind == "view" || options.kind == "next_view";
+  if (!of_view && !(options.view == ViewQuestionOptions{}))
+    return core::invalid_input(
+        "--look-from, --look-at, --about and --images are of 'ask view' and 'ask next_view': leave them out");
+  if (options.kind == "view") {
+    if (!options.object.empty()) return core::invalid_input("ask view takes no object: leave it out");
+    return view_question(options.view);
+  }
+  if (options.kind == "next_view") return next_view_question(options.object, options.view);
   if (options.kind == "explain") {
     if (!options.scene.empty())
       return core::invalid_input(
@@ -132,8 +143,16 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std:
     return achieve_question(achieve);
   }
   return core::invalid_input(
-      "ask where | relations | timeline | explain | stability OBJECT | release OBJECT | achieve OUTCOME, or --question "
-      "JSON");
+      "ask where | relations | timeline | explain | view | next_view OBJECT | stability OBJECT | release OBJECT | "
+      "achieve "
+      "OUTCOME, or --question JSON");
+}
+
+core::Status write_images(const AskOptions& options, const nlohmann::ordered_json& answer) {
+  if (options.view.images.empty()) return core::ok_status();
+  const auto view = answer.find("view");
+  return view == answer.end() ? core::data_loss("the answer has no images")
+                              : write_view_images(*view, options.view.images);
 }
 
 /// Of a scene file, of which nothing has been seen.
@@ -154,6 +173,7 @@ core::Status ask_scene(const AskOptions& options, const nlohmann::ordered_json& 
   const belief::Answer answer = queries::answer(scene, context.options().seed, query, asked);
   PRESCENE_RETURN_IF_ERROR(answer.error);
   const nlohmann::ordered_json document = belief::to_json(answer);
+  PRESCENE_RETURN_IF_ERROR(write_images(options, document));
   context.print(document, answer_text(document));
   return core::ok_status();
 }
@@ -170,6 +190,7 @@ core::Status run(AskOptions& options, VerbContext& context) {
   const auto answer = parse_or_discard(text);
   if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
   PRESCENE_RETURN_IF_ERROR(belief::error_from_json(answer));
+  PRESCENE_RETURN_IF_ERROR(write_images(options, answer));
   context.print(answer, answer_text(answer));
   return core::ok_status();
 }
@@ -179,13 +200,15 @@ core::Status run(AskOptions& options, VerbContext& context) {
 Verb add_ask_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("ask",
                                   "Ask a running `serve`, or a scene file: where | relations | timeline | explain | "
-                                  "stability OBJECT | release OBJECT | achieve OUTCOME");
+                                  "view | next_view OBJECT | stability OBJECT | release OBJECT | achieve OUTCOME");
   auto options = std::make_shared<AskOptions>();
   verb->add_option("KIND", options->kind,
                    "where: poses and confidence; relations: what is on, in, held by what; timeline: what was when; "
-                   "explain: what happened in the last seconds; stability: does it stay; release: what if it is let "
+                   "explain: what happened in the last seconds; view: what a camera will see; next_view: from where a "
+                   "look would "
+                   "tell most; stability: does it stay; release: what if it is let "
                    "go; achieve: how must it be done")
-      ->type_name("TEXT:{where,relations,timeline,explain,stability,release,achieve}")
+      ->type_name("TEXT:{where,relations,timeline,explain,view,next_view,stability,release,achieve}")
       ->check(utf8_text());
   verb->add_option("OBJECT", options->object, "The object's name in the scene; of achieve, the outcome's")
       ->check(utf8_text());
@@ -203,6 +226,7 @@ Verb add_ask_verb(CLI::App& app) {
                    "Of relations: also what is within reach of a point or robot body, as 0.4,0,0.9:0.8 or hand:0.8 (m)")
       ->check(utf8_text());
   add_timeline_options(*verb, options->timeline);
+  add_view_question_options(*verb, options->view);
   verb->add_option("--last", options->last, "Of explain: what happened in so many last seconds; default: 2")
       ->check(in_range(belief::kWindowSeconds));
   verb->add_option("--from", options->from, "Of explain: start of the window, s since the session's first frame")

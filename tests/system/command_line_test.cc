@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "prescene/geometry/primitives.h"
+#include "prescene/interfaces/images/png.h"
 #include "prescene/interfaces/mesh_files/mesh_file.h"
 #include "program.h"
 #include "tests/support/paths.h"
@@ -63,6 +64,12 @@ TEST(CommandLine, BadArgumentsEndWithTwo) {
                                              {"ask", "explain", "--scene", scenario("milk_on_bin")},
                                              {"ask", "explain", "--last", "0"},
                                              {"ask", "where", "--last", "2"},
+                                             {"ask", "where", "--images", "x"},
+                                             {"ask", "view", "--look-from", "0,0,1"},
+                                             {"ask", "view", "--look-from", "0,0", "--look-at", "0,0,0"},
+                                             {"ask", "view", "--look-from", "0,0,1", "--look-at", "0,0,1"},
+                                             {"ask", "next_view", "mug"},
+                                             {"ask", "next_view", "--look-from", "0,0,1", "--look-at", "0,0,0"},
                                              {"serve", "--scene", "x", "--domain", "999"}}) {
     const Finished finished = run_program(args);
     EXPECT_EQ(finished.exit_code, 2) << finished.err;
@@ -214,6 +221,30 @@ TEST(CommandLine, WithJsonAFailureIsOneDocumentToo) {
     EXPECT_TRUE(json.contains("error") || json.contains("files")) << finished.out;
     EXPECT_FALSE(finished.err.empty());
   }
+}
+
+// Straight down on the ground from 2 m: 2000 mm, everywhere the same but for the box in the middle, 1900 mm.
+TEST(CommandLine, AsksForTheViewFromAPointAndWritesItsImages) {
+  const ScratchDir scratch;
+  const std::filesystem::path folder = scratch.path() / "seen";
+  const std::string scene = (scratch.path() / "box.yaml").string();
+  write_file(scene,
+             "name: box\nduration: 0.2\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\n"
+             "supports:\n  floor: {ground: {size: 8}}\n"
+             "objects:\n  box: {model: box, pose: {position: [0, 0, 0.05]}}\n");
+  const Finished asked = run_program({"ask", "--scene", scene, "--question",
+                                      R"({"view": {"time": 0, "compact": true, "detail": ["spread"],
+      "pose": {"position": [0, 0, 2], "rotation": {"quaternion_wxyz": [0, 1, 0, 0]}},
+      "intrinsics": {"width": 41, "height": 31, "fx": 40}}})",
+                                      "--images", folder.string()});
+  ASSERT_EQ(asked.exit_code, 0) << asked.err;
+  const auto depth = interfaces::read_png_depth(folder / "mean_depth.png", 0.001);
+  ASSERT_TRUE(depth) << core::to_string(depth.status());
+  EXPECT_NEAR((*depth)(20, 15), 1.9, 1e-6);
+  EXPECT_NEAR((*depth)(2, 2), 2.0, 1e-6);
+  const auto deviation = interfaces::read_png_depth(folder / "depth_deviation.png", 0.0001);
+  ASSERT_TRUE(deviation) << core::to_string(deviation.status());
+  EXPECT_EQ((*deviation)(20, 15), 0.0F);
 }
 
 TEST(CommandLine, OutputThatCannotBeWrittenIsAFailure) {
