@@ -63,12 +63,15 @@ std::vector<ParameterRange> ranges_from(const JsonAt& at) {
   return ranges;
 }
 
+/// By the parameters' names.
+Json values_json(const std::vector<double>& values, const std::vector<SearchedParameter>& parameters) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < values.size() && i < parameters.size(); ++i) json[parameters[i].name] = values[i];
+  return json;
+}
+
 Json choice_json(const ActionChoice& choice, const std::vector<SearchedParameter>& parameters) {
-  const auto named = [&](const std::vector<double>& values) {
-    Json json = Json::object();
-    for (std::size_t i = 0; i < values.size() && i < parameters.size(); ++i) json[parameters[i].name] = values[i];
-    return json;
-  };
+  const auto named = [&](const std::vector<double>& values) { return values_json(values, parameters); };
   Json json{{"values", named(choice.values)}};
   if (!choice.low.empty()) {
     json["low"] = named(choice.low);
@@ -145,6 +148,13 @@ Json achieve_answer_json(const AchieveAnswer& answer) {
                           {"profile", parameter.profile}});
   Json choices = Json::array();
   for (const ActionChoice& choice : answer.choices) choices.push_back(choice_json(choice, answer.parameters));
+  Json candidates = Json::array();
+  for (const ActionCandidate& candidate : answer.candidates) {
+    Json& json = candidates.emplace_back(Json{{"values", values_json(candidate.values, answer.parameters)}});
+    if (candidate.X_WO) json["pose"] = to_json(*candidate.X_WO);
+    json["expected"] = candidate.expected;
+    json["instances"] = candidate.instances;
+  }
   Json failures = Json::array();
   for (const FailureReason& reason : answer.failures)
     failures.push_back({{"what", reason.what}, {"event", reason.event}, {"share", reason.share}});
@@ -158,6 +168,7 @@ Json achieve_answer_json(const AchieveAnswer& answer) {
             {"best", choice_json(answer.best, answer.parameters)},
             {"robust", answer.robust ? choice_json(*answer.robust, answer.parameters) : Json(nullptr)},
             {"choices", std::move(choices)},
+            {"candidates", std::move(candidates)},
             {"parameters", std::move(parameters)}};
   if (answer.map)
     json["map"] = {{"x", answer.map->x},         {"y", answer.map->y},

@@ -81,6 +81,7 @@ core::Result<ExplainQuestion> explain_question_from_json(std::string_view json) 
         id->fail("the text has " + std::to_string(question.id.size()) + " bytes: give at most " +
                  std::to_string(kLongestId));
     }
+    if (const auto stream = object.find("stream")) question.stream = stream->boolean();
     if (const auto asked = object.require("explain")) read_fields(*asked, question);
   }
   if (!errors.ok()) return errors.status();
@@ -107,6 +108,7 @@ Json to_json(const ExplainQuestion& question) {
   if (question.max_seconds) asked["effort"] = {{"max_seconds", *question.max_seconds}};
   Json json = Json::object();
   if (!question.id.empty()) json["id"] = question.id;
+  if (question.stream) json["stream"] = true;
   json["explain"] = std::move(asked);
   return json;
 }

@@ -280,7 +280,10 @@ struct AnswerJson {
 }  // namespace
 
 Json to_json(const Query& query) {
-  return {{"id", query.id}, {kTasks[query.what.index()], std::visit(QueryJson{}, query.what)}};
+  Json json{{"id", query.id}};
+  if (query.stream) json["stream"] = true;
+  json[kTasks[query.what.index()]] = std::visit(QueryJson{}, query.what);
+  return json;
 }
 
 core::Result<Query> query_from_json(std::string_view text) {
@@ -292,6 +295,7 @@ core::Result<Query> query_from_json(std::string_view text) {
   {
     JsonObject object({document, "", errors});
     if (const auto id = object.find("id")) query.id = id->text();
+    if (const auto stream = object.find("stream")) query.stream = stream->boolean();
     if (const auto explain = object.find("explain"))
       explain->fail(
           "this is asked of frames that were seen: ask a running 'serve', or 'prescene explain' of a recording");
@@ -340,6 +344,7 @@ core::Status error_from_json(const Json& document) {
 
 Json to_json(const Answer& answer) {
   Json json{{"id", answer.id}, {"step", answer.step}};
+  if (answer.is_final) json["final"] = *answer.is_final;
   if (!answer.error.ok()) json.update(error_to_json(answer.error));
   if (answer.what.index() > 0) json[kTasks[answer.what.index() - 1]] = std::visit(AnswerJson{}, answer.what);
   return json;

@@ -117,6 +117,57 @@ void remark_on(const SearchResult& found, const belief::AchieveQuery& query, bel
                              "): give more, or fewer free parameters.");
 }
 
+/// All of an answer that is known in the middle of the search, too, but the interval of `anywhere`.
+void describe(const SearchResult& found, const PreparedSearch& search, const belief::AchieveQuery& query,
+              belief::AchieveAnswer& answer) {
+  const PlannedAction& plan = *search.plan;
+  const ActionTrials& trials = *search.trials;
+  static_cast<belief::Basis&>(answer) = trials.basis();
+  answer.outcome = search.wanted.name;
+  answer.action = query.action;
+  answer.object = plan.object();
+  answer.support = plan.support();
+  answer.wanted = query.probability;
+  answer.confidence = query.effort.confidence;
+  answer.found = found.best >= 0;
+  for (std::size_t i = 0; i < plan.free().size(); ++i) {
+    const FreeParameter& free = plan.free()[i];
+    belief::SearchedParameter& parameter = answer.parameters.emplace_back();
+    parameter.name = free.schema.name;
+    parameter.unit = free.schema.unit;
+    parameter.low = free.low;
+    parameter.high = free.high;
+    if (i >= found.profiles.size()) continue;
+    parameter.profile = found.profiles[i];
+    parameter.fails_alone = found.fails_alone[i];
+  }
+  for (const SearchClaim& claim : found.claims)
+    answer.choices.push_back(choice_of(claim, plan, trials, query.probability));
+  if (answer.found)
+    answer.best = answer.choices[static_cast<std::size_t>(found.best)];
+  else if (found.nearest)
+    answer.best = choice_of(*found.nearest, plan, trials, query.probability);
+  if (found.box) answer.robust = choice_of(*found.box, plan, trials, query.probability);
+  for (const SearchLeader& leader : found.leaders) {
+    belief::ActionCandidate& candidate = answer.candidates.emplace_back();
+    candidate.values = trials.values_at(leader.at);
+    candidate.X_WO = plan.goal(candidate.values);
+    candidate.expected = leader.merit;
+    candidate.instances = leader.trials;
+  }
+  answer.anywhere.name = search.wanted.name;
+  if (found.explored > 0) {
+    answer.anywhere.probability = static_cast<double>(found.explored_successes) / found.explored;
+    answer.impossible = static_cast<double>(found.explored_impossible) / found.explored;
+  }
+  answer.search_instances = found.search_trials;
+  answer.attempts = found.attempts;
+  answer.step = search.simulator->step_size();
+  const simulation::StepperUse stepper = search.simulator->stepper();
+  answer.stepper = stepper.name;
+  answer.not_lockstep = stepper.not_lockstep;
+}
+
 }  // namespace
 
 core::Result<std::unique_ptr<PreparedSearch>> prepare_search(const Prior& prior, const belief::AchieveQuery& query,
@@ -172,7 +223,8 @@ core::Result<std::unique_ptr<PreparedSearch>> prepare_search(const Prior& prior,
 }
 
 core::Result<belief::AchieveAnswer> achieve(const Prior& prior, const belief::AchieveQuery& query,
-                                            const QueryContext& context) {
+                                            const QueryContext& context,
+                                            const SoFarSink<belief::AchieveAnswer>& so_far) {
   const core::Stopwatch watch;
   const double cpu_before = core::process_cpu_seconds();
   PRESCENE_TRY(const auto prepared, prepare_search(prior, query, context));
@@ -182,42 +234,31 @@ core::Result<belief::AchieveAnswer> achieve(const Prior& prior, const belief::Ac
   const SearchOptions& options = prepared->options;
 
   belief::AchieveAnswer answer;
-  const SearchResult found = search_parameters(trials, options, prior.stream, [&](const SearchClaim& /*claim*/) {
+  const auto on_claim = [&](const SearchClaim& /*claim*/) {
     if (answer.first_certified_instances > 0) return;
     answer.first_certified_instances = trials.basis().instances;
     answer.first_certified_simulated = trials.basis().simulated_seconds;
     answer.first_certified_seconds = watch.seconds();
-  });
+  };
+  const auto on_round = [&](const SearchResult& known) {
+    belief::AchieveAnswer partial = answer;
+    describe(known, *prepared, query, partial);
+    // May be looked at at any time, as those of the choices.
+    const ShareInterval anywhere =
+        confidence_sequence(known.explored_successes, known.explored, 1.0 - query.effort.confidence, {});
+    partial.anywhere.low = anywhere.low;
+    partial.anywhere.high = anywhere.high;
+    partial.wall_seconds = watch.seconds();
+    so_far(std::move(partial));
+  };
+  const SearchResult found = search_parameters(trials, options, prior.stream, on_claim,
+                                               so_far ? std::function<void(const SearchResult&)>(on_round) : nullptr);
   if (trials.basis().instances == 0 && found.stop == SearchStop::kStopped)
     return core::cancelled(
         "stopped before the first simulated instance was finished: give more time (max_seconds of a question, "
         "--max-seconds)");
 
-  answer.outcome = wanted.name;
-  answer.action = query.action;
-  answer.object = plan.object();
-  answer.support = plan.support();
-  answer.wanted = query.probability;
-  answer.confidence = query.effort.confidence;
-  answer.found = found.best >= 0;
-  for (std::size_t i = 0; i < plan.free().size(); ++i) {
-    const FreeParameter& free = plan.free()[i];
-    belief::SearchedParameter& parameter = answer.parameters.emplace_back();
-    parameter.name = free.schema.name;
-    parameter.unit = free.schema.unit;
-    parameter.low = free.low;
-    parameter.high = free.high;
-    if (i >= found.profiles.size()) continue;
-    parameter.profile = found.profiles[i];
-    parameter.fails_alone = found.fails_alone[i];
-  }
-  for (const SearchClaim& claim : found.claims)
-    answer.choices.push_back(choice_of(claim, plan, trials, query.probability));
-  if (answer.found)
-    answer.best = answer.choices[static_cast<std::size_t>(found.best)];
-  else if (found.nearest)
-    answer.best = choice_of(*found.nearest, plan, trials, query.probability);
-  if (found.box) answer.robust = choice_of(*found.box, plan, trials, query.probability);
+  describe(found, *prepared, query, answer);
   if (found.map_x >= 0) {
     answer.map = belief::ActionMap{answer.parameters[static_cast<std::size_t>(found.map_x)].name,
                                    answer.parameters[static_cast<std::size_t>(found.map_y)].name,
@@ -227,22 +268,10 @@ core::Result<belief::AchieveAnswer> achieve(const Prior& prior, const belief::Ac
                                    options.map_trials};
   }
   if (query.survey) answer.failures = failures_of(found, plan, trials, wanted, *prepared->scene);
-  static_cast<belief::Basis&>(answer) = trials.basis();
-  answer.anywhere.name = wanted.name;
-  if (found.explored > 0) {
-    answer.anywhere.probability = static_cast<double>(found.explored_successes) / found.explored;
-    const ShareInterval interval =
-        clopper_pearson(found.explored_successes, found.explored, 1.0 - query.effort.confidence);
-    answer.anywhere.low = interval.low;
-    answer.anywhere.high = interval.high;
-    answer.impossible = static_cast<double>(found.explored_impossible) / found.explored;
-  }
-  answer.search_instances = found.search_trials;
-  answer.attempts = found.attempts;
-  answer.step = prepared->simulator->step_size();
-  const simulation::StepperUse stepper = prepared->simulator->stepper();
-  answer.stepper = stepper.name;
-  answer.not_lockstep = stepper.not_lockstep;
+  const ShareInterval anywhere =
+      clopper_pearson(found.explored_successes, found.explored, 1.0 - query.effort.confidence);
+  answer.anywhere.low = anywhere.low;
+  answer.anywhere.high = anywhere.high;
   answer.converged = answer.found && found.stop == SearchStop::kDone;
   answer.stopped = stop_text(found, trials, context);
   answer.remarks = plan.remarks();

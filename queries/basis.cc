@@ -6,10 +6,10 @@
 #include "prescene/core/text.h"
 
 namespace prescene::queries {
+namespace {
 
-void account(const Foresight& foresight, belief::Basis& basis) {
+void account_for(const simulation::OutcomeEstimate& estimate, const Foresight& foresight, belief::Basis& basis) {
   constexpr double kNoticed = 0.002;  // m: what poses that rest by a scene file's rounded numbers do not reach
-  const simulation::OutcomeEstimate& estimate = foresight.estimate;
   basis.instances = static_cast<int>(estimate.instances.size());
   basis.failed_instances = estimate.failed;
   basis.simulated_seconds = estimate.simulated_seconds;
@@ -31,7 +31,17 @@ void account(const Foresight& foresight, belief::Basis& basis) {
   basis.wall_seconds = estimate.wall_seconds;
   basis.cpu_seconds = estimate.cpu_seconds;
   basis.converged = estimate.converged;
-  basis.stopped = simulation::to_string(estimate.stop);
+}
+
+}  // namespace
+
+void account(const Foresight& foresight, belief::Basis& basis) {
+  account_for(foresight.estimate, foresight, basis);
+  basis.stopped = simulation::to_string(foresight.estimate.stop);
+}
+
+void account_so_far(const Foresight& foresight, const simulation::OutcomeEstimate& so_far, belief::Basis& basis) {
+  account_for(so_far, foresight, basis);
 }
 
 std::string missing_text(const std::vector<std::string>& missing) {

@@ -12,6 +12,8 @@ namespace prescene::queries {
 
 /// All but the remarks.
 void account(const Foresight& foresight, belief::Basis& basis);
+/// The same of an estimate on which the work goes on: nothing has stopped it.
+void account_so_far(const Foresight& foresight, const simulation::OutcomeEstimate& so_far, belief::Basis& basis);
 
 /// The remark that names parts which were not worked out in time.
 std::string missing_text(const std::vector<std::string>& missing);

@@ -93,6 +93,8 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
                                     .edge_rounding = context.edge_rounding * foresight.simulator->length_scale(),
                                     .cancellation = &until});
   options.certifier = foresight.certifier.get();
+  if (detail.so_far)
+    options.on_look = [&](const simulation::OutcomeEstimate& so_far) { detail.so_far(foresight, so_far); };
   foresight.estimate =
       simulation::estimate_outcomes(*foresight.simulator, prior.starts, foresight.variables, foresight.request,
                                     prior.stream, options, *context.pool, &until, context.progress);

@@ -2,6 +2,7 @@
 // Simulates a scene from a prior under actions until the stop rule holds: what answers are made of.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -28,6 +29,9 @@ struct Foresight {
 struct ForesightDetail {
   bool to_rest = true;  ///< Else instances end as soon as they are decided, where that can be proved.
   bool keep_contacts = false;
+  /// Told of each look at what is known so far (simulation::EstimatorOptions::on_look); the foresight has all but its
+  /// estimate then. May be empty.
+  std::function<void(const Foresight& foresight, const simulation::OutcomeEstimate& so_far)> so_far = {};
 };
 /// Requested when the question is cancelled, and from QueryContext::simulate_until on.
 core::Cancellation end_of_simulating(const QueryContext& context);

@@ -34,22 +34,28 @@ double wrapped(double value) { return value - std::floor(value); }
 class Search {
  public:
   Search(TrialRunner& runner, const SearchOptions& options, const core::RandomStream& stream,
-         const std::function<void(const SearchClaim&)>& on_claim)
+         const std::function<void(const SearchClaim&)>& on_claim,
+         const std::function<void(const SearchResult&)>& on_round)
       : runner_(runner),
         options_(options),
         on_claim_(on_claim),
+        on_round_(on_round),
         dimensions_(options.periodic.size()),
         net_(static_cast<int>(dimensions_), options.net_seed),
         draws_(stream.for_purpose(core::Purpose::kAction).at(0)) {}
 
   SearchResult run() {
     find_first();
+    if (result_.first >= 0 && on_round_) tell(ranked());
     if (result_.first >= 0 && options_.survey) {
       improve();
+      if (on_round_) tell(ranked());
       survey(result_.claims[static_cast<std::size_t>(result_.best)].at);
       find_box();
+      if (on_round_) tell(ranked());
       draw_map(result_.claims[static_cast<std::size_t>(result_.best)].at);
     }
+    note_leaders(ranked());
     if (result_.first < 0) tell_nearest();
     result_.points = std::move(points_);
     return std::move(result_);
@@ -186,6 +192,20 @@ class Search {
     return order;
   }
 
+  void note_leaders(const std::vector<Ranked>& order) {
+    result_.leaders.clear();
+    for (const Ranked& one : std::span(order).first(std::min(order.size(), kMostLeaders))) {
+      const SearchPoint& point = points_[one.point];
+      result_.leaders.push_back({point.at, point.successes, point.trials, one.merit});
+    }
+  }
+
+  void tell(const std::vector<Ranked>& order) {
+    if (!on_round_ || over_) return;
+    note_leaders(order);
+    on_round_(result_);
+  }
+
   double overall_share() const {
     return (result_.explored_successes + 0.5) / (result_.explored - result_.explored_impossible + 1.0);
   }
@@ -312,7 +332,9 @@ class Search {
       }
       if (pending.empty()) return;  // nothing is possible anywhere
       if (!run_pending(pending)) return;
-      for (const Ranked& candidate : ranked()) {
+      const std::vector<Ranked> after = ranked();
+      tell(after);
+      for (const Ranked& candidate : after) {
         const SearchPoint& point = points_[candidate.point];
         if (candidate.merit < worth_testing) break;
         if (point.tested || point.trials < 8) continue;
@@ -513,6 +535,7 @@ class Search {
   TrialRunner& runner_;
   const SearchOptions& options_;
   const std::function<void(const SearchClaim&)>& on_claim_;
+  const std::function<void(const SearchResult&)>& on_round_;
   std::size_t dimensions_;
   core::SobolNet net_;
   core::RandomStream draws_;
@@ -526,12 +549,13 @@ class Search {
 }  // namespace
 
 SearchResult search_parameters(TrialRunner& runner, const SearchOptions& options, const core::RandomStream& stream,
-                               const std::function<void(const SearchClaim&)>& on_claim) {
+                               const std::function<void(const SearchClaim&)>& on_claim,
+                               const std::function<void(const SearchResult&)>& on_round) {
   PRESCENE_CHECK(!options.periodic.empty() && options.periodic.size() <= 16);
   PRESCENE_CHECK(options.wanted > 0.0 && options.wanted < 1.0);
   PRESCENE_CHECK(options.confidence > 0.0 && options.confidence < 1.0);
   PRESCENE_CHECK(options.max_trials > 0 && (!options.exact_trials || *options.exact_trials > 0));
-  return Search(runner, options, stream, on_claim).run();
+  return Search(runner, options, stream, on_claim, on_round).run();
 }
 
 }  // namespace prescene::queries

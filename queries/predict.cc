@@ -121,12 +121,13 @@ std::vector<belief::JointForecast> joints_at_end(const Foresight& foresight) {
   return forecasts;
 }
 
-std::vector<belief::OutcomeProbability> probabilities_of(const Foresight& foresight) {
+std::vector<belief::OutcomeProbability> probabilities_of(const Foresight& foresight,
+                                                         const simulation::OutcomeEstimate& estimate) {
   std::vector<belief::OutcomeProbability> all;
   for (std::size_t v = 0; v < foresight.variables.size(); ++v) {
     const simulation::Variable& variable = foresight.variables[v];
     for (std::size_t c = 0; c < reported_classes(variable); ++c) {
-      const simulation::ClassEstimate& one = foresight.estimate.variables[v].classes[c];
+      const simulation::ClassEstimate& one = estimate.variables[v].classes[c];
       all.push_back({variable.classes[c], variable.name, one.probability, one.low, one.high});
     }
   }
@@ -195,7 +196,8 @@ std::vector<belief::ProbabilityStage> history_of(const Foresight& foresight) {
 }  // namespace
 
 core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::PredictQuery& query,
-                                            const QueryContext& context) {
+                                            const QueryContext& context,
+                                            const SoFarSink<belief::PredictAnswer>& so_far) {
   const belief::Scene& own = *prior.scene;
   const belief::PredictDetail& wanted = query.detail;
   const bool use_own_outcomes = query.outcomes.empty() && query.exclusive_outcomes.empty();
@@ -206,12 +208,20 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   ForesightDetail detail;
   detail.to_rest = wanted.final_poses || wanted.typical_runs || wanted.contacts || wanted.paths > 0;
   detail.keep_contacts = wanted.contacts;
+  if (so_far)
+    detail.so_far = [&](const Foresight& foresight, const simulation::OutcomeEstimate& estimate) {
+      belief::PredictAnswer answer;
+      account_so_far(foresight, estimate, answer);
+      answer.outcomes = probabilities_of(foresight, estimate);
+      if (use_own_outcomes) answer.left_out = prior.left_out;
+      so_far(std::move(answer));
+    };
   PRESCENE_TRY(const Foresight foresight,
                foresee(prior, std::move(scene), query.duration.value_or(own.duration), query.effort, context, detail));
 
   belief::PredictAnswer answer;
   account(foresight, answer);
-  answer.outcomes = probabilities_of(foresight);
+  answer.outcomes = probabilities_of(foresight, foresight.estimate);
   answer.history = history_of(foresight);
   answer.joints = joints_at_end(foresight);
   const std::vector<std::size_t> objects = objects_asked_about(*foresight.scene);

@@ -64,7 +64,18 @@ void dispatch(const Known& known, const belief::Query& query, const QueryContext
               const AskRelations& ask_relations, belief::Answer& answer) {
   PRESCENE_CHECK(context.pool != nullptr);
   answer.id = query.id;
+  if (query.stream) answer.is_final = true;
   if (const core::Status asked = belief::validate(query); !asked.ok()) return put<belief::WhereAnswer>(asked, answer);
+  // Tells what is known so far under the answer's id and step.
+  const auto told = [&](auto so_far) {
+    belief::Answer partial;
+    partial.id = answer.id;
+    partial.step = answer.step;
+    partial.is_final = false;
+    partial.what = std::move(so_far);
+    context.on_answer_so_far(partial);
+  };
+  const bool tells = query.stream && context.on_answer_so_far;
   std::visit(
       [&](const auto& what) {
         using Asked = std::decay_t<decltype(what)>;
@@ -72,15 +83,24 @@ void dispatch(const Known& known, const belief::Query& query, const QueryContext
           put(where(known, what), answer);
         else if constexpr (std::is_same_v<Asked, belief::PredictQuery>)
           put(within_time(what.effort, context,
-                          [&](const QueryContext& limited) { return predict(make_prior(), what, limited); }),
+                          [&](const QueryContext& limited) {
+                            return predict(make_prior(), what, limited,
+                                           tells ? SoFarSink<belief::PredictAnswer>(told) : nullptr);
+                          }),
               answer);
         else if constexpr (std::is_same_v<Asked, belief::StabilityQuery>)
           put(within_time(what.effort, context,
-                          [&](const QueryContext& limited) { return stability(make_prior(), what, limited); }),
+                          [&](const QueryContext& limited) {
+                            return stability(make_prior(), what, limited,
+                                             tells ? SoFarSink<belief::StabilityAnswer>(told) : nullptr);
+                          }),
               answer);
         else if constexpr (std::is_same_v<Asked, belief::AchieveQuery>)
           put(within_time(what.effort, context,
-                          [&](const QueryContext& limited) { return achieve(make_prior(), what, limited); }),
+                          [&](const QueryContext& limited) {
+                            return achieve(make_prior(), what, limited,
+                                           tells ? SoFarSink<belief::AchieveAnswer>(told) : nullptr);
+                          }),
               answer);
         else if constexpr (std::is_same_v<Asked, belief::RelationsQuery>)
           put(ask_relations(what), answer);

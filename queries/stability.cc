@@ -35,7 +35,8 @@ belief::Action release_now(const Prior& prior, std::size_t object) {
 }  // namespace
 
 core::Result<belief::StabilityAnswer> stability(const Prior& prior, const belief::StabilityQuery& query,
-                                                const QueryContext& context) {
+                                                const QueryContext& context,
+                                                const SoFarSink<belief::StabilityAnswer>& so_far) {
   if (!(query.max_move > 0.0) || !(query.max_turn > 0.0))
     return core::invalid_input("max_move and max_turn have to be more than 0");
   const std::optional<int> object = belief::find_object(*prior.scene, query.object);
@@ -51,12 +52,24 @@ core::Result<belief::StabilityAnswer> stability(const Prior& prior, const belief
       "stability",
       {ever("moves", belief::MovedMoreThan{query.max_move}), ever("turns", belief::TurnedMoreThan{query.max_turn})}};
   PRESCENE_TRY(auto scene, with_question(*prior.scene, std::move(actions), {}, {std::move(group)}));
-  PRESCENE_TRY(const Foresight foresight, foresee(prior, std::move(scene), query.duration, query.effort, context));
+  const auto begun = [&query](const simulation::OutcomeEstimate& estimate) {
+    const simulation::ClassEstimate& stays = estimate.variables[0].classes[2];  // neither moves nor turns
+    belief::StabilityAnswer answer;
+    answer.object = query.object;
+    answer.stable = {"stable", "", stays.probability, stays.low, stays.high};
+    return answer;
+  };
+  ForesightDetail detail;
+  if (so_far)
+    detail.so_far = [&](const Foresight& foresight, const simulation::OutcomeEstimate& estimate) {
+      belief::StabilityAnswer answer = begun(estimate);
+      account_so_far(foresight, estimate, answer);
+      so_far(std::move(answer));
+    };
+  PRESCENE_TRY(const Foresight foresight,
+               foresee(prior, std::move(scene), query.duration, query.effort, context, detail));
 
-  const simulation::ClassEstimate& stays = foresight.estimate.variables[0].classes[2];  // neither moves nor turns
-  belief::StabilityAnswer answer;
-  answer.object = query.object;
-  answer.stable = {"stable", "", stays.probability, stays.low, stays.high};
+  belief::StabilityAnswer answer = begun(foresight.estimate);
   account(foresight, answer);
   answer.remarks = remarks_of(answer, query.effort);
   if (const std::optional<std::size_t> unstable = typical_instance(foresight, 0, {0, 1}, index)) {

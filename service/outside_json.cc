@@ -28,4 +28,15 @@ std::string id_of_document(const nlohmann::ordered_json& document) {
   return text.size() <= kLongestIdKept ? text : "";
 }
 
+bool is_so_far(const nlohmann::ordered_json& answer) {
+  if (!answer.is_object()) return false;
+  const auto final = answer.find("final");
+  return final != answer.end() && final->is_boolean() && !final->get<bool>();
+}
+
+bool text_is_so_far(std::string_view answer_text) {
+  // Looked for first, as most answers are others and need not be parsed.
+  return answer_text.find("\"final\"") != std::string_view::npos && is_so_far(parse_or_discard(answer_text));
+}
+
 }  // namespace prescene::service

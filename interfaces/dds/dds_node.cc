@@ -191,8 +191,8 @@ void DdsNode::Impl::deliver(Subscription& subscription, const ddsi_serdata* samp
     return;
   }
   const SerialisedBytes bytes(sample, size);
-  subscription.on_message(
-      {subscription.topic, subscription.type, bytes.copy(), info.source_timestamp, core::steady_now_ns()});
+  subscription.on_message({subscription.topic, subscription.type, bytes.copy(), info.source_timestamp,
+                           core::steady_now_ns(), info.publication_handle});
 }
 
 // Cyclone's own count of lost samples leaves out those that newer ones push out of the reader's history.

@@ -2,6 +2,7 @@
 #include "achieve_options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -197,9 +198,17 @@ std::string achieve_text(const Json& answer) {
                                      : "nothing certified with " + wanted + " before the search ended (" + stopped +
                                            "); best so far, not tested for it, is\n";
     text += "  best: " + values_text(best.at("values")) + "\n        " + probability_text(best) + "\n";
+  } else if (answer.value("stopped", "").empty()) {  // what is known so far
+    text += "nothing certified yet\n";
   } else {
     text += "none found, and nothing could be tried\n";
   }
+  constexpr std::size_t kMostCandidates = 3;
+  const auto candidates = answer.find("candidates");  // not given by a service of another version
+  for (std::size_t i = 0; !found && candidates != answer.end() && i < std::min(kMostCandidates, candidates->size());
+       ++i)
+    text += "  looks good: " + values_text((*candidates)[i].at("values")) + ", P about " +
+            core::fixed_text((*candidates)[i].value("expected", 0.0), 2) + "\n";
   if (const Json& robust = answer.at("robust"); !robust.is_null()) {
     text += "  most robust: " + values_text(robust.at("values")) + "\n        each anywhere between " +
             values_text(robust.at("low")) + "\n        and " + values_text(robust.at("high")) + "\n        " +

@@ -35,6 +35,7 @@ struct AskOptions {
   std::string wanted;
   ViewQuestionOptions view;
   std::string scene;
+  bool stream = false;
   const CLI::App* verb = nullptr;
   interfaces::DdsOptions dds;
 };
@@ -155,6 +156,18 @@ core::Status write_images(const AskOptions& options, const nlohmann::ordered_jso
                               : write_view_images(*view, options.view.images);
 }
 
+/// What is known until the answer is there.
+void print_so_far(const nlohmann::ordered_json& answer, VerbContext& context) {
+  context.print_line(answer, "so far:\n" + answer_text(answer));
+}
+
+void print_answer(const AskOptions& options, const nlohmann::ordered_json& answer, VerbContext& context) {
+  if (options.stream)
+    context.print_line(answer, answer_text(answer));
+  else
+    context.print(answer, answer_text(answer));
+}
+
 /// Of a scene file, of which nothing has been seen.
 core::Status ask_scene(const AskOptions& options, const nlohmann::ordered_json& question, VerbContext& context) {
   std::vector<const char*> of_bus(kDomainOptions.begin(), kDomainOptions.end());
@@ -170,28 +183,40 @@ core::Status ask_scene(const AskOptions& options, const nlohmann::ordered_json& 
   if (options.kind == "release" && !options.achieve.duration)
     core::log(context.log(), core::LogLevel::kInfo,
               "looking " + core::rounded_text(scene->duration) + " s ahead, the scene's duration (--duration)");
+  if (options.stream)
+    asked.on_answer_so_far = [&context](const belief::Answer& so_far) {
+      print_so_far(belief::to_json(so_far), context);
+    };
   const belief::Answer answer = queries::answer(scene, context.options().seed, query, asked);
   PRESCENE_RETURN_IF_ERROR(answer.error);
   const nlohmann::ordered_json document = belief::to_json(answer);
   PRESCENE_RETURN_IF_ERROR(write_images(options, document));
-  context.print(document, answer_text(document));
+  print_answer(options, document, context);
   return core::ok_status();
 }
 
 core::Status run(AskOptions& options, VerbContext& context) {
-  PRESCENE_TRY(const auto question, question_of(options, context.options().seed));
+  PRESCENE_TRY(auto question, question_of(options, context.options().seed));
+  if (options.stream) question["stream"] = true;
   if (!options.scene.empty()) return ask_scene(options, question, context);
   PRESCENE_RETURN_IF_ERROR(take_domain(*options.verb, options.dds));
   PRESCENE_TRY(const auto client, QuestionClient::create(options.dds, context.log()));
+  QuestionClient::Sinks sinks;
+  if (options.stream)
+    sinks.so_far = [&context](const std::string& text) {
+      if (const auto so_far = parse_or_discard(text); so_far.is_object()) print_so_far(so_far, context);
+    };
+  else
+    sinks.progress = context.progress("answering");
   const auto asked = client->ask(belief::json_text(question), options.timeout.value_or(seconds_to_wait(question)),
-                                 context.cancellation(), context.progress("answering"));
+                                 context.cancellation(), sinks);
   context.end_progress();
   PRESCENE_TRY(const std::string text, asked);
   const auto answer = parse_or_discard(text);
   if (!answer.is_object()) return core::data_loss("the answer is not JSON: " + text.substr(0, 200));
   PRESCENE_RETURN_IF_ERROR(belief::error_from_json(answer));
   PRESCENE_RETURN_IF_ERROR(write_images(options, answer));
-  context.print(answer, answer_text(answer));
+  print_answer(options, answer, context);
   return core::ok_status();
 }
 
@@ -239,6 +264,9 @@ Verb add_ask_verb(CLI::App& app) {
       ->check(utf8_text());
   verb->add_option("--scene", options->scene, "Ask of this scene file instead of a running `serve`")
       ->check(file_name());
+  verb->add_flag(
+      "--stream", options->stream,
+      "Also what is known so far, as soon as there is anything, and then better; with --json each on a line");
   options->verb = verb;
   add_domain_option(*verb, options->dds);
   verb->footer(

@@ -178,6 +178,12 @@ void VerbContext::print(const nlohmann::ordered_json& document, const std::strin
   printed_ = true;
 }
 
+void VerbContext::print_line(const nlohmann::ordered_json& document, const std::string& text) {
+  end_progress();
+  write_out(options_.json ? belief::json_text(document) + "\n" : text);
+  printed_ = true;
+}
+
 void VerbContext::write_out(const std::string& out) {
   const bool written = std::fwrite(out.data(), 1, out.size(), stdout) == out.size();
   if (!written || std::fflush(stdout) != 0) print_failed_ = true;

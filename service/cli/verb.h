@@ -66,6 +66,8 @@ class VerbContext {
 
   /// One JSON document to stdout with --json, the text otherwise.
   void print(const nlohmann::ordered_json& document, const std::string& text);
+  /// One of several: with --json, each document is a line of its own.
+  void print_line(const nlohmann::ordered_json& document, const std::string& text);
   /// The verb's end: what went wrong to stderr, and with --json as error_document() to stdout where nothing was
   /// printed. Output that could not be written (a full disk, a closed pipe) is a failure too.
   ExitCode finish(const std::string& verb, core::Status status);

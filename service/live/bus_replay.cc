@@ -123,9 +123,10 @@ class BusPlayer {
       if (topic.name == kQueryTopic) {
         PRESCENE_TRY(questions_, node_.advertise(topic.name, topic.type, topic.write));
       } else if (topic.name == kAnswerTopic) {
-        PRESCENE_RETURN_IF_ERROR(node_.subscribe(
-            topic.name, topic.type, topic.read,
-            [&listener = listener_, text_of](auto&& message) { listener.add_answer(text_of(message)); }));
+        PRESCENE_RETURN_IF_ERROR(
+            node_.subscribe(topic.name, topic.type, topic.read, [&listener = listener_, text_of](auto&& message) {
+              if (const std::string answer = text_of(message); !text_is_so_far(answer)) listener.add_answer(answer);
+            }));
       }
     }
     return core::ok_status();

@@ -91,7 +91,7 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   impl->backends = &backends;
   PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, log));
   Impl* raw = impl.get();
-  const auto on_answer = [raw](const std::string& answer) {  // on two threads
+  const auto on_answer = [raw](const std::string& answer) {  // on several threads
     raw->check_sent(raw->node->publish(raw->answers, interfaces::RosString{answer}));
     {
       const std::lock_guard lock(raw->answered_mutex);
@@ -102,9 +102,9 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   };
   PRESCENE_TRY(impl->answers, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable));
   ServiceCalls::Hooks hooks;
-  hooks.ask = [raw](const std::string& question) {
+  hooks.ask = [raw](const std::string& question, const std::string& client) {
     raw->put_text(kQueryTopic, question);
-    raw->worker->ask(question);
+    raw->worker->ask(question, client);
   };
   hooks.restart = [raw] { raw->put_text(kControlTopic, R"({"restart": true})"); };
   hooks.keeps_learned = impl->learned_file != nullptr;
@@ -113,6 +113,10 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
     impl->settings.worker.on_progress = [raw, topic = *progress](const std::string& text) {
       raw->check_sent(raw->node->publish(topic, interfaces::RosString{text}));
     };
+  // By the answers' own writer, so that none comes after the answer. They are not recorded: the answer is.
+  impl->settings.worker.on_answer_so_far = [raw](const std::string& answer) {
+    raw->check_sent(raw->node->publish(raw->answers, interfaces::RosString{answer}));
+  };
   impl->history = std::make_unique<HistoryKeeper>(backends, settings.history);
   impl->settings.worker.timeline = [raw] { return raw->history->timeline(); };
   impl->settings.worker.explain = [raw](const belief::ExplainQuestion& question, const queries::QueryContext& context) {
@@ -203,7 +207,7 @@ core::Status LiveService::Impl::join_bus() {
     try {
       auto question = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
       if (question)
-        worker->ask((*std::move(question)).data);
+        worker->ask((*std::move(question)).data, "writer " + std::to_string(message.writer));
       else
         ++unreadable_questions;
     } catch (const std::exception&) {

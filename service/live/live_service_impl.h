@@ -114,7 +114,7 @@ struct LiveService::Impl {
   std::string domain_text() const { return "DDS domain " + std::to_string(settings.dds.domain); }
   ServiceHealth health() const;
   void report_changes(const ServiceHealth& health);
-  /// Called on the thread that simulates for questions.
+  /// Called on the threads that simulate for questions, on one at a time.
   core::Result<nlohmann::ordered_json> explain(const belief::ExplainQuestion& question,
                                                const queries::QueryContext& context);
 
@@ -154,7 +154,7 @@ struct LiveService::Impl {
   std::uint64_t idle_controls = 0;
   std::string last_idle_control;
   Backends* backends = nullptr;
-  std::unique_ptr<rendering::LikelihoodBatch> explaining;  // of the thread that simulates; made when it is needed
+  std::unique_ptr<rendering::LikelihoodBatch> explaining;  // of explain(); made when it is needed
   /// Since the last frame that was used, s; by simulated time where there is one.
   std::optional<double> seconds_since_frame() const;
 

@@ -25,6 +25,8 @@ constexpr std::size_t kMostRefusalsWaiting = 256;
 // s between the last simulated instance and the end of all work on a question, at most.
 constexpr double kRestSeconds = 1.5;
 constexpr double kProgressInterval = 0.2;  // s, at least, between two messages on how far the work is
+// s, at least, between two answers so far: what a reader with a history of ten answers can take from several questions.
+constexpr double kSoFarInterval = 0.05;
 
 /// Questions without limits of their own are bounded in time, so that a robot gets its answer.
 void bound_effort(belief::Query& query, double default_seconds, double most_seconds) {
@@ -54,8 +56,21 @@ std::optional<core::Result<CancelRequest>> cancel_request(const std::string& tex
   return core::invalid_input("cancel: give the id of a question: {\"cancel\": \"7\"}");
 }
 
-core::Status too_many_wait(std::size_t count) {
-  return core::unavailable(std::to_string(count) + " " + kQuestionsWait + ": ask again later");
+core::Status no_room(FairBound bound, const FairLimits& limits) {
+  const std::string wait = std::string(" ") + kQuestionsWait;
+  switch (bound) {
+    case FairBound::kOfClient:
+      return core::unavailable(std::to_string(limits.of_client) + wait +
+                               ", as many as one client may have waiting: ask again later");
+    case FairBound::kOfAll:
+      return core::unavailable(std::to_string(limits.of_all) + wait +
+                               ", as many as may wait of all clients together, and of this one as many as of any "
+                               "other or more: ask again later");
+    case FairBound::kBytesOfAll:
+      return core::unavailable("so many long" + wait + " that the " + std::to_string(limits.bytes_of_all >> 10) +
+                               " KiB for their text are full: ask again later, or give shorter ones");
+  }
+  return core::unavailable(kQuestionsWait);
 }
 
 }  // namespace
@@ -79,35 +94,37 @@ void add_learned_seconds(core::TimeNs first_frame_ns, nlohmann::ordered_json& ob
 QueryWorker::QueryWorker(Backends& backends, int threads, const QueryWorkerSettings& settings,
                          std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer)
     : backends_(backends),
-      pool_(threads, core::PoolPriority::kLow),
       settings_(settings),
       default_seconds_(settings.default_seconds),
       most_seconds_(settings.most_seconds),
       snapshot_(std::move(snapshot)),
       on_answer_(std::move(on_answer)),
-      reader_([this] { read_questions(); }) {
+      unread_(settings.unread),
+      waiting_(settings.waiting) {
+  const auto at_once = static_cast<std::size_t>(std::max(1, settings.at_once));
+  in_work_.resize(at_once);
+  for (std::size_t i = 0; i < at_once; ++i)
+    pools_.push_back(std::make_unique<core::ThreadPool>(threads, core::PoolPriority::kLow));
   try {
-    simulator_ = std::thread([this] { simulate_questions(); });
-  } catch (...) {  // no memory for it: the other one must end before this object does
-    {
-      const std::lock_guard lock(mutex_);
-      stop_.request();
-    }
-    read_changed_.notify_all();
-    reader_.join();
+    reader_ = std::thread([this] { read_questions(); });
+    for (std::size_t i = 0; i < at_once; ++i) simulators_.emplace_back([this, i] { simulate_questions(i); });
+  } catch (...) {  // no memory for one: the others must end before this object does
+    end_threads();
     throw;
   }
 }
 
-QueryWorker::~QueryWorker() {
+QueryWorker::~QueryWorker() { end_threads(); }
+
+void QueryWorker::end_threads() {
   {
     const std::lock_guard lock(mutex_);
     stop_.request();
   }
   read_changed_.notify_all();
   simulate_changed_.notify_all();
-  reader_.join();
-  simulator_.join();
+  if (reader_.joinable()) reader_.join();
+  for (std::thread& simulator : simulators_) simulator.join();
 }
 
 QueryCounts QueryWorker::counts() const {
@@ -115,71 +132,71 @@ QueryCounts QueryWorker::counts() const {
   return counts_;
 }
 
-void QueryWorker::ask(std::string question_json) {
+void QueryWorker::ask(std::string question_json, std::string client) {
   try {
-    take(std::move(question_json));
+    take(std::move(question_json), client);
   } catch (const std::exception&) {
     drop();
   }
 }
 
-void QueryWorker::take(std::string question_json) {
+void QueryWorker::take(std::string question_json, const std::string& client) {
   const std::size_t bytes = std::min(question_json.size(), kLongestQuestion + 1);
-  const bool may_have_id = question_json.size() <= kLongestWithId;
   if (question_json.size() > bytes) {  // what is longer is refused by the reader, and need not be kept
     question_json.resize(bytes);
     question_json.shrink_to_fit();
   }
+  std::vector<FairQueue<std::string>::Refused> refused;
   {
     const std::lock_guard lock(mutex_);
-    if (unread_.size() < settings_.max_unread && unread_bytes_ + bytes <= settings_.max_unread_bytes) {
-      unread_.push_back(std::move(question_json));
-      unread_bytes_ += bytes;
-      read_changed_.notify_one();
-      return;
-    }
-    if (!may_have_id || too_many_.size() >= kMostRefusalsWaiting) {
-      ++counts_.unanswered;
-      return;
-    }
+    refused = unread_.push(client, std::move(question_json), bytes);
+    read_changed_.notify_one();
   }
-  std::string id = id_of(question_json);
-  const std::lock_guard lock(mutex_);
-  too_many_.push_back(std::move(id));
-  read_changed_.notify_one();
+  for (const auto& one : refused) note_no_room(one.item, no_room(one.bound, settings_.unread));
+}
+
+void QueryWorker::note_no_room(const std::string& question_json, const core::Status& reason) {
+  try {
+    const auto is_full = [this] { return too_many_.size() >= kMostRefusalsWaiting; };
+    {
+      const std::lock_guard lock(mutex_);
+      if (question_json.size() > kLongestWithId || is_full()) {
+        ++counts_.unanswered;
+        return;
+      }
+    }
+    Refusal refusal{id_of(question_json), reason};
+    const std::lock_guard lock(mutex_);
+    too_many_.push_back(std::move(refusal));
+    read_changed_.notify_one();
+  } catch (const std::exception&) {
+    drop();
+  }
 }
 
 void QueryWorker::read_questions() {
   for (bool refusals_first = false;; refusals_first = !refusals_first) {
-    std::string question, id;
-    bool is_refusal = false;
+    std::optional<FairQueue<std::string>::Entry> question;
+    Refusal refusal;
     {
       std::unique_lock lock(mutex_);
       read_changed_.wait(lock, [&] { return stop_.requested() || !unread_.empty() || !too_many_.empty(); });
       if (stop_.requested()) return;
-      is_refusal = unread_.empty() || (refusals_first && !too_many_.empty());
-      if (is_refusal) {
-        id = std::move(too_many_.front());
+      if (unread_.empty() || (refusals_first && !too_many_.empty())) {
+        refusal = std::move(too_many_.front());
         too_many_.pop_front();
       } else {
-        question = std::move(unread_.front());
-        unread_.pop_front();
-        unread_bytes_ -= question.size();
+        question = unread_.pop();
       }
     }
-    if (!is_refusal) {
-      read(question);
-      continue;
-    }
-    try {
-      refuse(id, too_many_wait(settings_.max_unread));
-    } catch (const std::exception&) {
-      drop();
-    }
+    if (question)
+      read(question->item, question->client);
+    else
+      refuse(refusal.id, refusal.reason);
   }
 }
 
-void QueryWorker::read(const std::string& question_json) {
+void QueryWorker::read(const std::string& question_json, const std::string& client) {
   std::string id;
   try {
     if (question_json.size() > kLongestQuestion)
@@ -201,35 +218,38 @@ void QueryWorker::read(const std::string& question_json) {
                            std::holds_alternative<belief::TimelineQuery>(read->what);
       if (!at_once) bound_effort(*read, default_seconds_, most_seconds_);
       question = std::make_shared<const Question>(*std::move(read));
-      if (at_once) return answer(*question, stop_);
+      if (at_once) return answer(*question, stop_, *pools_.front());
     }
     id = id_in(*question);
     core::Status reason;
+    std::vector<FairQueue<Work>::Refused> refused;
     {
       const std::lock_guard lock(mutex_);
-      const auto has_id = [&id](const Work& other) { return other.question && id_in(*other.question) == id; };
-      const auto same_id = std::find_if(waiting_.begin(), waiting_.end(), has_id);
-      const Work& other = same_id != waiting_.end() ? *same_id : in_work_;
-      if (!id.empty() && has_id(other)) {
-        if (*other.question == *question) {
+      if (const Work* other = id.empty() ? nullptr : find_work(id)) {
+        if (*other->question == *question) {
           ++counts_.repeated;
           return;
         }
         reason = core::invalid_input("another question with the id '" + id +
                                      "' is not answered yet: choose another id, one that no other client uses");
-      } else if (waiting_.size() < settings_.max_waiting) {
-        waiting_.push_back(
-            {question, std::make_shared<core::Cancellation>(stop_, core::Cancellation::Clock::time_point::max())});
-        simulate_changed_.notify_one();
-        return;
       } else {
-        reason = too_many_wait(settings_.max_waiting);
+        auto end = std::make_shared<core::Cancellation>(stop_, core::Cancellation::Clock::time_point::max());
+        refused = waiting_.push(client, {question, std::move(end)}, question_json.size());
+        simulate_changed_.notify_one();
       }
     }
-    refuse(id, reason);
+    for (const auto& one : refused) refuse(id_in(*one.item.question), no_room(one.bound, settings_.waiting));
+    if (!reason.ok()) refuse(id, reason);
   } catch (const std::exception&) {
     refuse_after_exception(id, "the question could not be read");
   }
+}
+
+const QueryWorker::Work* QueryWorker::find_work(const std::string& id) const {
+  const auto has_id = [&id](const Work& work) { return work.question && id_in(*work.question) == id; };
+  for (const Simulating& one : in_work_)
+    if (has_id(one.work)) return &one.work;
+  return waiting_.find_if(has_id);
 }
 
 void QueryWorker::cancel(const CancelRequest& request) {
@@ -237,9 +257,13 @@ void QueryWorker::cancel(const CancelRequest& request) {
   {
     const std::lock_guard lock(mutex_);
     ++counts_.cancels;
-    worked_on = in_work_.question && id_in(*in_work_.question) == request.question;
-    if (worked_on) in_work_.end->request();  // its answer says the rest
-    waited = std::erase_if(waiting_, [&](const Work& work) { return id_in(*work.question) == request.question; }) > 0;
+    const auto is_meant = [&](const Work& work) { return work.question && id_in(*work.question) == request.question; };
+    for (const Simulating& one : in_work_) {
+      if (!is_meant(one.work)) continue;
+      worked_on = true;
+      one.work.end->request();  // its answer says the rest
+    }
+    waited = waiting_.erase_if(is_meant) > 0;
   }
   if (waited) refuse(request.question, core::cancelled("cancelled before it was begun"));
   if (request.id.empty()) return;
@@ -250,31 +274,42 @@ void QueryWorker::cancel(const CancelRequest& request) {
        nullptr);
 }
 
-void QueryWorker::simulate_questions() {
+std::optional<FairQueue<QueryWorker::Work>::Entry> QueryWorker::take_next() {
+  const auto explains = [](const Work& work) {
+    return work.question && std::holds_alternative<belief::ExplainQuestion>(*work.question);
+  };
+  return waiting_.pop_if([&](const std::string& client, const Work& work) {
+    return std::none_of(in_work_.begin(), in_work_.end(), [&](const Simulating& one) {
+      return one.work.question && (one.client == client || (explains(one.work) && explains(work)));
+    });
+  });
+}
+
+void QueryWorker::simulate_questions(std::size_t thread) {
   core::lower_thread_priority();
   for (;;) {
-    Work work;
+    std::optional<FairQueue<Work>::Entry> next;
     {
       std::unique_lock lock(mutex_);
-      simulate_changed_.wait(lock, [&] { return stop_.requested() || !waiting_.empty(); });
+      simulate_changed_.wait(lock, [&] { return stop_.requested() || (next = take_next()); });
       if (stop_.requested()) return;
-      work = std::move(waiting_.front());
-      waiting_.pop_front();
-      in_work_ = work;
+      in_work_[thread] = {next->item, std::move(next->client)};
     }
-    answer(*work.question, *work.end);
+    answer(*next->item.question, *next->item.end, *pools_[thread]);
   }
 }
 
-void QueryWorker::answer(const Question& question, const core::Cancellation& cancelled) {
+void QueryWorker::answer(const Question& question, const core::Cancellation& cancelled, core::ThreadPool& pool) {
   const std::string& id = id_in(question);
   const auto finish = [&] {
     // Before the answer goes out: whoever has it may ask under the same id again.
     const std::lock_guard lock(mutex_);
-    if (in_work_.question.get() == &question) in_work_ = {};
+    for (Simulating& one : in_work_)
+      if (one.work.question.get() == &question) one = {};
+    simulate_changed_.notify_all();  // the next question of the same client may begin
   };
   try {
-    const Reply reply = reply_to(question, cancelled);
+    const Reply reply = reply_to(question, cancelled, pool);
     finish();
     if (reply.text.size() > interfaces::CdrLimits().max_string_bytes)
       return refuse(id, core::resource_exhausted("the answer has " + std::to_string(reply.text.size() >> 20) +
@@ -300,8 +335,21 @@ core::ProgressSink QueryWorker::progress_of(const std::string& id) const {
   };
 }
 
-QueryWorker::Reply QueryWorker::reply_to(const Question& question, const core::Cancellation& cancelled) {
-  queries::QueryContext context = backends_.query_context(pool_);
+std::function<void(const belief::Answer&)> QueryWorker::so_far_of(const belief::Query& query) const {
+  if (!settings_.on_answer_so_far || !query.stream || query.id.empty()) return {};
+  return [this, told = std::optional<core::Stopwatch>()](const belief::Answer& so_far) mutable {
+    if (told && told->seconds() < kSoFarInterval) return;
+    try {
+      settings_.on_answer_so_far(belief::json_text(belief::to_json(so_far)));
+    } catch (const std::exception&) {  // no reason to end the work
+    }
+    told.emplace();
+  };
+}
+
+QueryWorker::Reply QueryWorker::reply_to(const Question& question, const core::Cancellation& cancelled,
+                                         core::ThreadPool& pool) {
+  queries::QueryContext context = backends_.query_context(pool);
   const double most_seconds = most_seconds_;
   const core::Cancellation end(cancelled, queries::deadline_after(most_seconds + kRestSeconds));
   context.cancellation = context.abandoned = &end;
@@ -312,7 +360,9 @@ QueryWorker::Reply QueryWorker::reply_to(const Question& question, const core::C
   if (context.progress) context.progress({0.0, std::nullopt, "begun"});
   if (const auto* to_explain = std::get_if<belief::ExplainQuestion>(&question))
     return reply_to(*to_explain, context, cancelled);
-  return reply_to(std::get<belief::Query>(question), context);
+  const auto& query = std::get<belief::Query>(question);
+  context.on_answer_so_far = so_far_of(query);
+  return reply_to(query, context);
 }
 
 QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query, const queries::QueryContext& context) {
@@ -335,7 +385,8 @@ QueryWorker::Reply QueryWorker::reply_to(const belief::ExplainQuestion& question
             false};
   if (question.max_seconds)
     context.simulate_until = std::min(*context.simulate_until, queries::deadline_after(*question.max_seconds));
-  const auto document = settings_.explain(question, context);
+  auto document = settings_.explain(question, context);
+  if (document && question.stream) (*document)["final"] = true;
   if (document) return {belief::json_text(*document), true};
   // Its time was over in the middle of a search, unless somebody stopped it.
   const bool too_late = document.status().code() == core::StatusCode::kCancelled && !cancelled.requested();

@@ -69,13 +69,7 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
                                [raw, log](interfaces::ReceivedMessage&& message) {
                                  const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
                                  if (!text) return core::log(log, core::LogLevel::kWarning, text.status().message());
-                                 const auto answer = parse_or_discard(text->data);
-                                 if (!answer.is_object() || !answer.contains("id") || !answer["id"].is_string()) return;
-                                 const std::lock_guard lock(raw->mutex_);
-                                 const auto waiting = raw->answers_.find(answer["id"].get<std::string>());
-                                 if (waiting == raw->answers_.end()) return;  // somebody else's
-                                 waiting->second.answer = text->data;
-                                 raw->changed_.notify_all();
+                                 raw->note_answer(text->data);
                                }));
   // Whoever may not read it does without.
   static_cast<void>(client->node_->subscribe(kProgressTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable,
@@ -90,6 +84,25 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
 }
 
 QuestionClient::~QuestionClient() { node_.reset(); }
+
+void QuestionClient::note_answer(const std::string& text) {
+  const auto answer = parse_or_discard(text);
+  if (!answer.is_object() || !answer.contains("id") || !answer["id"].is_string()) return;
+  std::shared_ptr<Told> told;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto waiting = answers_.find(answer["id"].get<std::string>());
+    if (waiting == answers_.end()) return;  // somebody else's
+    if (!is_so_far(answer)) {
+      waiting->second.answer = text;
+      changed_.notify_all();
+      return;
+    }
+    told = waiting->second.told;
+  }
+  const std::lock_guard lock(told->mutex);
+  if (told->sinks.so_far) told->sinks.so_far(text);
+}
 
 void QuestionClient::note_progress(const nlohmann::ordered_json& said) {
   const auto is = [&said](const char* key, bool (nlohmann::ordered_json::*kind)() const noexcept) {
@@ -108,7 +121,7 @@ void QuestionClient::note_progress(const nlohmann::ordered_json& said) {
     told = waiting->second.told;
   }
   const std::lock_guard lock(told->mutex);
-  if (told->progress) told->progress(at);
+  if (told->sinks.progress) told->sinks.progress(at);
 }
 
 core::Status QuestionClient::cancel(const std::string& id) {
@@ -118,16 +131,16 @@ core::Status QuestionClient::cancel(const std::string& id) {
 /// Answers with an id are kept while it lives.
 class QuestionClient::Waiting {
  public:
-  Waiting(QuestionClient& client, std::string id, const core::ProgressSink& progress)
+  Waiting(QuestionClient& client, std::string id, const Sinks& sinks)
       : client_(client), id_(std::move(id)), told_(std::make_shared<Told>()) {
-    told_->progress = progress;
+    told_->sinks = sinks;
     const std::lock_guard lock(client_.mutex_);
     is_first_ = client_.answers_.try_emplace(id_, Waited{{}, told_}).second;
   }
   ~Waiting() {
     {
       const std::lock_guard lock(told_->mutex);
-      told_->progress = {};  // what it refers to may end with this
+      told_->sinks = {};  // what it refers to may end with this
     }
     if (!is_first_) return;
     const std::lock_guard lock(client_.mutex_);
@@ -154,15 +167,14 @@ class QuestionClient::Waiting {
 };
 
 core::Result<std::string> QuestionClient::ask(const std::string& question_json, double timeout,
-                                              const core::Cancellation& cancellation,
-                                              const core::ProgressSink& progress) {
+                                              const core::Cancellation& cancellation, const Sinks& sinks) {
   auto question = parse_or_discard(question_json);
   if (!question.is_object()) return core::invalid_input("a question is a JSON object (docs/reference/queries.md)");
   if (question.contains("id") && !question["id"].is_string())
     return core::invalid_input("id: a question's id is a text, in quotes; leave it out to have one made");
   if (!question.contains("id") || question["id"] == "") question["id"] = new_id();
   const std::string id = question["id"].get<std::string>();
-  Waiting waiting(*this, id, progress);
+  Waiting waiting(*this, id, sinks);
   if (!waiting.is_first())
     return core::invalid_input("id: a question with this id waits for its answer already; choose another id");
   const auto deadline =

@@ -14,6 +14,7 @@ namespace {
 
 constexpr const char* kTrigger = "std_srvs/srv/Trigger";
 constexpr std::size_t kMostWaiting = 256;
+constexpr std::size_t kMostOfOne = 64;  // so that one caller does not have the calls of others given up
 constexpr std::size_t kMostSaves = 64;
 
 std::string id_of_call(const interfaces::ServiceRequest& request) {
@@ -77,14 +78,27 @@ void ServiceCalls::ask(const interfaces::ServiceRequest& request, const std::str
   {
     const std::lock_guard lock(mutex_);
     waiting_.emplace_back(id, request);
-    for (; waiting_.size() > kMostWaiting; waiting_.pop_front()) {
-      dropped.push_back(waiting_.front().second);
-      ++given_up_;
-    }
+    dropped = give_up_old(request.client);
   }
   for (const interfaces::ServiceRequest& old : dropped)
-    reply(old, false, error_answer("", core::unavailable("too many questions came: ask again later")));
-  hooks_.ask(belief::json_text(json));
+    reply(old, false,
+          error_answer("", core::unavailable("too many calls wait for answers (at most " + std::to_string(kMostOfOne) +
+                                             " of one caller and " + std::to_string(kMostWaiting) +
+                                             " in all): ask again later")));
+  hooks_.ask(belief::json_text(json), "caller " + std::to_string(request.client));
+}
+
+std::vector<interfaces::ServiceRequest> ServiceCalls::give_up_old(std::uint64_t client) {
+  std::vector<interfaces::ServiceRequest> dropped;
+  const auto is_own = [client](const auto& call) { return call.second.client == client; };
+  const bool own_are_too_many =
+      static_cast<std::size_t>(std::count_if(waiting_.begin(), waiting_.end(), is_own)) > kMostOfOne;
+  if (!own_are_too_many && waiting_.size() <= kMostWaiting) return dropped;
+  const auto old = own_are_too_many ? std::find_if(waiting_.begin(), waiting_.end(), is_own) : waiting_.begin();
+  dropped.push_back(old->second);
+  waiting_.erase(old);
+  ++given_up_;
+  return dropped;
 }
 
 void ServiceCalls::note_answer(const std::string& answer_json) {

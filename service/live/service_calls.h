@@ -28,9 +28,10 @@ inline constexpr const char* kAskService = "/prescene/ask";
 class ServiceCalls {
  public:
   struct Hooks {
-    std::function<void(const std::string& question)> ask;  ///< Called on the bus's thread, as the next.
-    std::function<void()> restart;                         ///< Has the belief begin anew.
-    bool keeps_learned = false;                            ///< Else nothing can be saved.
+    /// Called on the bus's thread, as the next; `client` is another one for each caller.
+    std::function<void(const std::string& question, const std::string& client)> ask;
+    std::function<void()> restart;  ///< Has the belief begin anew.
+    bool keeps_learned = false;     ///< Else nothing can be saved.
   };
   /// `node` must outlive this; `hooks` hand over what is asked.
   ServiceCalls(interfaces::DdsNode& node, Hooks hooks, core::LogSink log)
@@ -51,6 +52,8 @@ class ServiceCalls {
  private:
   /// Has a question answered by note_answer(); `question` is JSON.
   void ask(const interfaces::ServiceRequest& request, const std::string& question);
+  /// With mutex_ held: gives up the oldest calls where too many wait, of one caller or in all.
+  std::vector<interfaces::ServiceRequest> give_up_old(std::uint64_t client);
 
   interfaces::DdsNode& node_;
   Hooks hooks_;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/outside_json.h"
 #include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/topics.h"
 
@@ -148,7 +149,8 @@ core::Status BusView::Impl::join() {
   PRESCENE_RETURN_IF_ERROR(
       subscribe(kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray", TopicQos::kState, &Impl::take_health));
   return node->subscribe(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable, [this](ReceivedMessage&& message) {
-    if (const auto answer = interfaces::decode_cdr<interfaces::RosString>(message.cdr)) view->answer(answer->data);
+    const auto answer = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
+    if (answer && !text_is_so_far(answer->data)) view->answer(answer->data);
   });
 }
 

@@ -239,14 +239,23 @@ std::vector<double> weights_of(const StartDistribution& starts, const std::vecto
   return weights;
 }
 
-/// Fills in weights, intervals and the totals from the records, and adds a stage to the history.
-void evaluate(const StartDistribution& starts, std::span<const Variable> variables, const EstimatorOptions& options,
-              OutcomeEstimate& estimate) {
+/// Fills in weights and totals from the records.
+void weigh(const StartDistribution& starts, OutcomeEstimate& estimate) {
   estimate.simulated_seconds = estimate.flown_seconds = 0.0;
-  estimate.variables.clear();
-  estimate.converged = false;
-  if (estimate.instances.empty()) return;
+  estimate.failed = 0;
+  const std::vector<double> weights = weights_of(starts, estimate.instances);
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    InstanceRecord& record = estimate.instances[i];
+    record.weight = weights[i];
+    estimate.failed += record.failed ? 1 : 0;
+    estimate.simulated_seconds += record.simulated_seconds;
+    estimate.flown_seconds += record.flown_seconds;
+  }
+}
 
+/// Shares and intervals of what was weighed, and whether all are narrow enough.
+void evaluate(const StartDistribution& starts, std::span<const Variable> variables, double confidence, double tolerance,
+              OutcomeEstimate& estimate) {
   std::vector<ComponentClasses> components(starts.components.size());
   for (std::size_t k = 0; k < components.size(); ++k) components[k].weight = starts.components[k].weight;
   const CertificateUse& use = estimate.certificates;
@@ -254,37 +263,63 @@ void evaluate(const StartDistribution& starts, std::span<const Variable> variabl
   if (!use.switched_off && use.mismatches > 0)
     doubt = static_cast<double>(use.mismatches) / use.audited * use.certified /
             static_cast<double>(estimate.instances.size());
-  estimate.failed = static_cast<int>(std::count_if(estimate.instances.begin(), estimate.instances.end(),
-                                                   [](const InstanceRecord& record) { return record.failed; }));
-  const std::vector<double> weights = weights_of(starts, estimate.instances);
   double failed_share = 0.0;
-  for (std::size_t i = 0; i < weights.size(); ++i) {
-    estimate.instances[i].weight = weights[i];
-    if (estimate.instances[i].failed) failed_share += weights[i];
-  }
+  for (const InstanceRecord& record : estimate.instances)
+    if (record.failed) failed_share += record.weight;
   estimate.converged = true;
+  estimate.variables.clear();
   for (std::size_t v = 0; v < variables.size(); ++v) {
     for (ComponentClasses& component : components) component.classes.clear();
     for (const InstanceRecord& record : estimate.instances)
       components[static_cast<std::size_t>(record.component)].classes.push_back(record.classes[v]);
     VariableEstimate& variable = estimate.variables.emplace_back();
     for (std::size_t c = 0; c < variables[v].classes.size(); ++c) {
-      ClassEstimate& found =
-          variable.classes.emplace_back(class_estimate(components, static_cast<int>(c), options.confidence));
+      ClassEstimate& found = variable.classes.emplace_back(class_estimate(components, static_cast<int>(c), confidence));
       if (estimate.certain) found.low = found.high = found.probability, found.half_width = 0.0;
       found.half_width += doubt + failed_share;
       found.low = std::max(0.0, found.low - doubt);
       found.high = std::min(1.0, found.high + doubt + failed_share);
-      estimate.converged = estimate.converged && variable.classes.back().half_width <= options.tolerance;
+      estimate.converged = estimate.converged && variable.classes.back().half_width <= tolerance;
     }
   }
-
-  for (const InstanceRecord& record : estimate.instances) {
-    estimate.simulated_seconds += record.simulated_seconds;
-    estimate.flown_seconds += record.flown_seconds;
-  }
-  estimate.history.push_back({static_cast<int>(estimate.instances.size()), estimate.variables});
 }
+
+/// Tells whoever wants to know what is known so far. Each look has its share of the tolerated error.
+class Looks {
+ public:
+  Looks(const StartDistribution& starts, std::span<const Variable> variables, const EstimatorOptions& options)
+      : starts_(starts), variables_(variables), options_(options) {}
+
+  /// Instances before the first look, and whether each component has some of them then.
+  static constexpr std::size_t kFirst = 32;
+  bool wants_first(const OutcomeEstimate& estimate) const {
+    constexpr int kFewest = 4;  // of a component: fewer say nothing of how it scatters
+    if (!options_.on_look || estimate.certain || estimate.instances.size() != kFirst) return false;
+    std::vector<int> counts(starts_.components.size(), 0);
+    for (const InstanceRecord& record : estimate.instances) ++counts[static_cast<std::size_t>(record.component)];
+    return std::all_of(counts.begin(), counts.end(), [](int count) { return count >= kFewest; });
+  }
+
+  /// Of an estimate that was weighed; it is as before when this returns.
+  void tell(OutcomeEstimate& estimate, double wall_seconds) {
+    if (!options_.on_look || estimate.certain || estimate.instances.empty()) return;
+    const double look = ++looks_;
+    const double error = (1.0 - options_.confidence) / (look * (look + 1.0));
+    std::vector<VariableEstimate> own = std::move(estimate.variables);
+    const bool converged = estimate.converged;
+    evaluate(starts_, variables_, 1.0 - error, options_.tolerance, estimate);
+    estimate.wall_seconds = wall_seconds;
+    options_.on_look(estimate);
+    estimate.variables = std::move(own);
+    estimate.converged = converged;
+  }
+
+ private:
+  const StartDistribution& starts_;
+  std::span<const Variable> variables_;
+  const EstimatorOptions& options_;
+  int looks_ = 0;
+};
 
 double widest_half(const OutcomeEstimate& estimate) {
   double widest = 0.0;
@@ -369,6 +404,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
                                  [](const StartComponent& component) { return component.dimensions == 0; }) &&
                      starts.components.size() <= limit;
   Forecast forecast(options, progress);
+  Looks looks(starts, variables, options);
   const std::size_t most_at_once = largest_chunk(starts, samplers, request, options.bytes_of_runs);
   std::size_t chunk = std::min(chunk_size(pool), most_at_once);
   std::optional<EstimateStop> stop;
@@ -380,7 +416,9 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
     const std::size_t target = std::min(limit, plan.order().size());
     while (!stop && estimate.instances.size() < target) {
       const std::size_t done = estimate.instances.size();
-      const auto planned = std::span(plan.order()).subspan(done, std::min(chunk, target - done));
+      // Of whatever size chunks are, the first look is at the same instances.
+      const std::size_t end = options.on_look && done < Looks::kFirst ? std::min(Looks::kFirst, target) : target;
+      const auto planned = std::span(plan.order()).subspan(done, std::min(chunk, end - done));
       const double begun = watch.seconds();
       if (!run_chunk(runner, planned, estimate.instances, trail) || (cancellation && cancellation->requested()))
         stop = EstimateStop::kCancelled;
@@ -388,6 +426,11 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
         stop = EstimateStop::kTimeLimit;
       if (watch.seconds() - begun < kShortChunk) chunk = std::min(2 * chunk, most_at_once);
       forecast.report(static_cast<double>(estimate.instances.size()));
+      if (!stop && looks.wants_first(estimate) && !trail.fails(Looks::kFirst, options.tolerated_mismatch)) {
+        estimate.certificates = trail.use_of(Looks::kFirst);
+        weigh(starts, estimate);
+        looks.tell(estimate, watch.seconds());
+      }
     }
     bool switched_off = estimate.certificates.switched_off;
     if (runner.certifier && trail.fails(estimate.instances.size(), options.tolerated_mismatch)) {
@@ -398,7 +441,14 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
     }
     estimate.certificates = trail.use_of(estimate.instances.size());
     estimate.certificates.switched_off = switched_off;
-    evaluate(starts, variables, options, estimate);
+    weigh(starts, estimate);
+    estimate.variables.clear();
+    estimate.converged = false;
+    if (!estimate.instances.empty()) {
+      evaluate(starts, variables, options.confidence, options.tolerance, estimate);
+      estimate.history.push_back({static_cast<int>(estimate.instances.size()), estimate.variables});
+      looks.tell(estimate, watch.seconds());
+    }
     forecast.stage_done(static_cast<double>(estimate.instances.size()), widest_half(estimate),
                         settled_text(variables, estimate));
     // Whoever gave a time may also cancel when it is over.

@@ -342,6 +342,50 @@ TEST(Achieve, IsAskedInJson) {
     EXPECT_THAT(belief::query_from_json(text).status().message(), HasSubstr(reason)) << text;
 }
 
+TEST(Achieve, ToldWhileItSearchesTheAnswerIsTheSame) {
+  AchieveQuery query = question();
+  query.effort.exact_instances = 3000;
+  const auto without_times = [](AchieveAnswer answer) {
+    answer.wall_seconds = answer.cpu_seconds = answer.first_certified_seconds = 0.0;
+    return answer;
+  };
+  const AchieveAnswer plain = without_times(std::get<AchieveAnswer>(ask(query).what));
+  std::vector<std::vector<AchieveAnswer>> told;
+  for (const int threads : {1, 3}) {
+    core::ThreadPool pool(threads);
+    QueryContext context = tests::context_with(fall, pool);
+    std::vector<AchieveAnswer>& here = told.emplace_back();
+    context.on_answer_so_far = [&](const Answer& so_far) {
+      EXPECT_EQ(so_far.id, "q");
+      EXPECT_EQ(so_far.is_final, false);
+      here.push_back(without_times(std::get<AchieveAnswer>(so_far.what)));
+    };
+    const Answer answer = queries::answer(held_scene(), 1, {"q", query, true}, context);
+    EXPECT_EQ(answer.is_final, true);
+    EXPECT_EQ(without_times(std::get<AchieveAnswer>(answer.what)), plain) << threads << " threads";
+  }
+  EXPECT_EQ(told[0], told[1]);
+  ASSERT_GE(told[0].size(), 3u);
+  EXPECT_EQ(told[0].front().instances, 128) << "as soon as the first batch is done";
+  for (std::size_t i = 1; i < told[0].size(); ++i) {
+    const AchieveAnswer &before = told[0][i - 1], &after = told[0][i];
+    EXPECT_GE(after.instances, before.instances);
+    EXPECT_GE(after.choices.size(), before.choices.size()) << "what is certified stays so";
+    for (std::size_t c = 0; c < before.choices.size(); ++c) EXPECT_EQ(after.choices[c], before.choices[c]);
+  }
+  for (const AchieveAnswer& so_far : told[0]) {
+    EXPECT_LE(so_far.candidates.size(), 10u);
+    for (std::size_t c = 0; c < so_far.candidates.size(); ++c) {
+      EXPECT_TRUE(so_far.candidates[c].X_WO) << "of a place, where the object is let go";
+      if (c > 0) {
+        EXPECT_LE(so_far.candidates[c].expected, so_far.candidates[c - 1].expected) << "the best first";
+      }
+    }
+    for (const belief::ActionChoice& choice : so_far.choices) EXPECT_GE(choice.lower, query.probability);
+  }
+  EXPECT_EQ(told[0].back().choices.front(), plain.choices.front());
+}
+
 TEST(Achieve, AnswersInJson) {
   core::ThreadPool pool(2);
   const Answer answer = ask(question());

@@ -70,6 +70,30 @@ TEST_F(LiveServiceTest, TracksPublishesAndAnswers) {
   EXPECT_TRUE(stop().ok());
 }
 
+TEST_F(LiveServiceTest, WhatIsKnownSoFarComesOverTheBusBeforeTheAnswer) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon, 6));
+  std::vector<nlohmann::ordered_json> told;  // until the answer
+  ASSERT_TRUE(robot_.send_until(
+      [&] {
+        robot_.ask(
+            R"({"id": "s", "stream": true, "stability": {"object": "box", "effort": {"exact_instances": 200}}})");
+        told.clear();
+        for (const std::string& answer : robot_.answers()) {
+          told.push_back(nlohmann::ordered_json::parse(answer));
+          if (told.back().at("final") == true) return true;
+        }
+        return false;
+      },
+      kNoon + 1000 * kSecond));
+  ASSERT_GE(told.size(), 2U);
+  for (const auto& answer : told) EXPECT_EQ(answer.at("id"), "s");
+  EXPECT_EQ(told.front().at("final"), false);
+  EXPECT_LT(told.front().at("stability").at("instances"), 200);
+  EXPECT_EQ(told.back().at("stability").at("instances"), 200);
+  EXPECT_TRUE(stop().ok());
+}
+
 TEST_F(LiveServiceTest, ServicesAnswerAndRestart) {
   start();
   ASSERT_TRUE(tracks_from(kNoon, 6));
@@ -91,6 +115,9 @@ TEST_F(LiveServiceTest, ServicesAnswerAndRestart) {
   const auto asked = ask.call(R"({"where": {"object": "box"}})");
   ASSERT_TRUE(asked.has_value());
   EXPECT_TRUE(asked->success) << asked->text;
+  const auto streamed = ask.call(R"({"stream": true, "stability": {"object": "box"}})");
+  ASSERT_TRUE(streamed.has_value());
+  EXPECT_THAT(streamed->text, HasSubstr("\"final\":true")) << "a service replies with the answer only";
   for (const char* nonsense : {"", "no JSON", "[]", R"({"where": 7})", R"({"stability": {"object": "nobody"}})"}) {
     const auto refused = ask.call(nonsense);
     ASSERT_TRUE(refused.has_value()) << nonsense;

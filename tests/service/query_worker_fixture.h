@@ -66,7 +66,7 @@ class WorkerUnderTest {
         });
   }
 
-  void ask(const std::string& question) { worker_->ask(question); }
+  void ask(const std::string& question, const std::string& client = "") { worker_->ask(question, client); }
   /// All of them before any answer that comes meanwhile can be handed over; `then` is called before it can, too.
   void ask_at_once(const std::vector<std::string>& questions, const std::function<void()>& then = {}) {
     const std::lock_guard lock(mutex_);

@@ -105,8 +105,8 @@ TEST(QueryWorker, AnswersAreThoseOfAWorkerThatIsAskedNothingElse) {
 
 TEST(QueryWorker, QuestionsThatFindNoRoomAreRefusedOrCounted) {
   QueryWorkerSettings settings = limited_to(1e5);
-  settings.max_waiting = 2;
-  settings.max_unread = 4;
+  settings.waiting.of_all = 2;
+  settings.unread.of_all = 4;
   WorkerUnderTest worker(settings);
   worker.ask(kLong);
   constexpr std::uint64_t kAsked = 3000;

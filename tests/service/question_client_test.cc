@@ -91,6 +91,32 @@ TEST_F(QuestionClientTest, SeveralThreadsGetEachItsOwnAnswer) {
   (*service)->stop_receiving();
 }
 
+TEST_F(QuestionClientTest, WhatIsKnownSoFarComesBeforeTheAnswer) {
+  auto service = interfaces::DdsNode::create(options(), {});
+  ASSERT_TRUE(service.ok()) << service.status().message();
+  const auto answers = (*service)->advertise(kAnswerTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable);
+  ASSERT_TRUE(answers.ok());
+  ASSERT_TRUE((*service)
+                  ->subscribe(kQueryTopic, "std_msgs/msg/String", interfaces::TopicQos::kCommands,
+                              [&](interfaces::ReceivedMessage&& message) {
+                                const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
+                                const std::string begin = R"({"id": ")" + id_of(text->data) + R"(", "final": )";
+                                for (const char* rest : {"false, \"n\": 1}", "false, \"n\": 2}", "true, \"n\": 3}"})
+                                  EXPECT_TRUE((*service)->publish(*answers, interfaces::RosString{begin + rest}).ok());
+                              })
+                  .ok());
+  std::vector<int> told;
+  const auto so_far = [&told](const std::string& text) { told.push_back(parse_or_discard(text).value("n", 0)); };
+  const auto answer = (*client_)->ask(R"({"stream": true, "where": {}})", kPatience, never_, {{}, so_far});
+  ASSERT_TRUE(answer.ok()) << answer.status().message();
+  EXPECT_EQ(parse_or_discard(*answer).value("n", 0), 3);
+  EXPECT_EQ(told, (std::vector<int>{1, 2}));
+  const auto unasked = (*client_)->ask(R"({"where": {}})", kPatience, never_);
+  ASSERT_TRUE(unasked.ok()) << unasked.status().message();
+  EXPECT_EQ(parse_or_discard(*unasked).value("n", 0), 3) << "what is known so far is taken for no answer";
+  (*service)->stop_receiving();
+}
+
 TEST_F(QuestionClientTest, AnIdThatWaitsAlreadyIsRefused) {
   core::Cancellation enough;
   std::thread first([&] {

@@ -109,6 +109,31 @@ TEST(OutcomeEstimatorStatistics, IntervalsCoverAsStatedWhenTheProgramStopsByItse
   }
 }
 
+// Whoever looks at each stage, and keeps the worst of what was told, is right as often as stated.
+TEST(OutcomeEstimatorStatistics, IntervalsOfAllLooksHoldTogether) {
+  constexpr int kSeeds = 200;
+  core::ThreadPool pool(1);
+  for (const ToyProblem& problem : {tests::one_boundary(), tests::curved_boundary(), tests::chaotic()}) {
+    const std::size_t classes = problem.probabilities.size();
+    std::vector<int> always_covered(classes, 0);
+    for (int s = 0; s < kSeeds; ++s) {
+      std::vector<std::uint8_t> covered(classes, 1);
+      EstimatorOptions options;
+      options.exact_instances = 1024;
+      options.on_look = [&](const OutcomeEstimate& so_far) {
+        for (std::size_t c = 0; c < classes; ++c) {
+          const ClassEstimate& one = so_far.variables[0].classes[c];
+          if (problem.probabilities[c] < one.low || problem.probabilities[c] > one.high) covered[c] = 0;
+        }
+      };
+      static_cast<void>(estimate(problem, 2000 + static_cast<std::uint64_t>(s), options, pool));
+      for (std::size_t c = 0; c < classes; ++c) always_covered[c] += covered[c];
+    }
+    // 180 of 200 is what a coverage of 0.95 falls below once in a thousand times.
+    for (const int count : always_covered) EXPECT_GE(count, 180) << problem.name;
+  }
+}
+
 TEST(OutcomeEstimatorStatistics, ConfidenceIsAParameter) {
   const ToyProblem problem = tests::chaotic();
   const Coverage narrow = coverage(problem, 0.02, 0.8, 200), wide = coverage(problem, 0.02, 0.99, 100);

@@ -69,6 +69,15 @@ struct ActionChoice {
   friend bool operator==(const ActionChoice&, const ActionChoice&) = default;
 };
 
+/// A choice that looks good so far. As it was chosen for that, it is probably not quite as good: there is no interval.
+struct ActionCandidate {
+  std::vector<double> values;  ///< In the order of AchieveAnswer::parameters.
+  std::optional<Pose> X_WO;    ///< Of place: where the object is let go.
+  double expected = 0.0;       ///< Probability of the outcome, guessed from its instances and those of its neighbours.
+  int instances = 0;           ///< Of its own.
+  friend bool operator==(const ActionCandidate&, const ActionCandidate&) = default;
+};
+
 /// A parameter that was searched.
 struct SearchedParameter {
   std::string name, unit;
@@ -107,7 +116,8 @@ struct AchieveAnswer : Basis {
   /// The centre of the largest neighbourhood that was found in which the outcome comes about with the wanted
   /// probability.
   std::optional<ActionChoice> robust;
-  std::vector<ActionChoice> choices;  ///< Certified ones, in the order in which they were found.
+  std::vector<ActionChoice> choices;        ///< Certified ones, in the order in which they were found.
+  std::vector<ActionCandidate> candidates;  ///< At most ten, the best first, whether certified or not.
   std::optional<ActionMap> map;
   std::vector<FailureReason> failures;  ///< Most frequent first.
   OutcomeProbability anywhere;          ///< With the parameters drawn anywhere in their ranges.

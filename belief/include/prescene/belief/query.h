@@ -88,6 +88,8 @@ struct Query {
   std::variant<WhereQuery, PredictQuery, StabilityQuery, ViewQuery, AchieveQuery, RelationsQuery, TimelineQuery,
                NextViewQuery>
       what;
+  /// Answers so far are wanted, too, as soon as there is anything to tell. Does not change the answer.
+  bool stream = false;
   friend bool operator==(const Query&, const Query&) = default;
 };
 
@@ -193,7 +195,9 @@ struct ViewAnswer {
 struct Answer {
   std::string id;
   std::uint64_t step = 0;  ///< Of the belief that was asked.
-  core::Status error;      ///< Not ok: could not be answered, and why.
+  /// Of a query that is to be streamed: whether this is the answer, or what is known so far. Else nothing.
+  std::optional<bool> is_final = {};
+  core::Status error;  ///< Not ok: could not be answered, and why.
   std::variant<std::monostate, WhereAnswer, PredictAnswer, StabilityAnswer, ViewAnswer, AchieveAnswer, RelationsAnswer,
                TimelineAnswer, NextViewAnswer>
       what;

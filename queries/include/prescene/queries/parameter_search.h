@@ -83,7 +83,17 @@ struct SearchClaim {
   double merit = 0.0;               ///< What the search took its probability for, before the test.
 };
 
+/// A point that the search takes for a good one. It was chosen because its trials went well, so that it is probably not
+/// quite as good as they say: claims, which rest on fresh trials, are what can be relied on.
+struct SearchLeader {
+  UnitPoint at;
+  int successes = 0, trials = 0;
+  double merit = 0.0;  ///< What the search takes its probability for, from its trials and those near it.
+};
+
 enum class SearchStop { kDone, kMaxTrials, kExact, kStopped };
+
+inline constexpr std::size_t kMostLeaders = 10;
 
 struct SearchResult {
   std::vector<SearchPoint> points;
@@ -93,7 +103,8 @@ struct SearchResult {
   /// Where none holds: the point that did best, with an interval from fresh trials (as far as there was time). Nothing
   /// where no possible point was found.
   std::optional<SearchClaim> nearest;
-  std::optional<SearchClaim> box;  ///< The largest box that was found whose claim holds.
+  std::optional<SearchClaim> box;     ///< The largest box that was found whose claim holds.
+  std::vector<SearchLeader> leaders;  ///< At most kMostLeaders, the best first.
   /// About the best point (or the nearest): shares of success along each parameter; -1 where nothing is possible.
   std::vector<std::vector<double>> profiles;
   std::vector<double> fails_alone;  ///< 1 - mean of the profile.
@@ -107,8 +118,11 @@ struct SearchResult {
   SearchStop stop = SearchStop::kDone;
 };
 
-/// The same arguments give the same result. `on_claim` is called with each claim as it is found; may be empty.
+/// The same arguments give the same result. `on_claim` is called with each claim as it is found, `on_round` with what
+/// is known so far (but `points`) after each round of trials until the first claim, and with each claim and each part
+/// of the survey; both may be empty.
 SearchResult search_parameters(TrialRunner& runner, const SearchOptions& options, const core::RandomStream& stream,
-                               const std::function<void(const SearchClaim&)>& on_claim = {});
+                               const std::function<void(const SearchClaim&)>& on_claim = {},
+                               const std::function<void(const SearchResult& so_far)>& on_round = {});
 
 }  // namespace prescene::queries

@@ -57,6 +57,10 @@ struct QueryContext {
   std::function<std::shared_ptr<const belief::ObservedTimeline>()> timeline;
   /// Called from the calling thread; may be empty.
   core::ProgressSink progress;
+  /// Of a query that is to be streamed (belief::Query::stream): called from the calling thread with what is known so
+  /// far, as soon as some instances are done and whenever there is more to tell; may be empty. Its intervals hold
+  /// together (docs/reference/queries.md). Does not change the answer.
+  std::function<void(const belief::Answer& so_far)> on_answer_so_far;
 };
 
 /// How long an answer takes beyond its Effort::max_seconds, s: instances under way are cut off after the first, and all

@@ -18,5 +18,8 @@ nlohmann::ordered_json parse_or_discard(std::string_view text, std::size_t most_
 /// The "id" of a question or an answer; empty where there is none, or a very long one.
 std::string id_of_document(const nlohmann::ordered_json& document);
 std::string id_of(std::string_view text);
+/// Whether it is what is known so far of an answer that follows (docs/reference/queries.md).
+bool is_so_far(const nlohmann::ordered_json& answer);
+bool text_is_so_far(std::string_view answer_text);
 
 }  // namespace prescene::service

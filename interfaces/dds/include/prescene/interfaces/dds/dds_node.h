@@ -80,6 +80,7 @@ struct ReceivedMessage {
   std::vector<std::uint8_t> cdr;
   core::TimeNs source_ns = 0;    ///< The writer's wall time.
   core::TimeNs received_ns = 0;  ///< Ours, of core::steady_now_ns(): does not jump when the wall clock is set.
+  std::uint64_t writer = 0;      ///< Who wrote it: a number of this process, another one for each writer.
 };
 
 /// A topic that other participants of the domain write or read now. A name that carries two types is two of them.

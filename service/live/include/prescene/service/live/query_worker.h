@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Answers questions that come in as JSON, from snapshots of the belief, on two threads of its own: one reads questions,
-// answers `where` and `timeline` and refuses what it must; the other answers what has to be simulated, one question
-// after the other. So `where` never waits for a simulation. What is simulated takes as many threads as the filter,
-// which get the processor after the filter's (nice 10).
+// Answers questions that come in as JSON, from snapshots of the belief, on threads of its own: one reads questions,
+// answers `where` and `timeline` and refuses what it must; the others answer what has to be simulated, each one
+// question at a time. So `where` never waits for a simulation. What is simulated takes as many threads as the filter
+// for each question in work, which get the processor after the filter's (nice 10).
+//
+// Clients take turns, one question each, both in being read and in being simulated. Of each client one question at most
+// is simulated at a time, so that none can keep the others waiting for longer than one of its questions takes.
 #pragma once
 
 #include <atomic>
@@ -13,9 +16,11 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <thread>
 #include <variant>
+#include <vector>
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/explain_question.h"
@@ -24,28 +29,35 @@
 #include "prescene/core/status.h"
 #include "prescene/queries/query_engine.h"
 #include "prescene/service/backends.h"
+#include "prescene/service/live/fair_queue.h"
 
 namespace prescene::service {
 
 struct QueryWorkerSettings {
-  std::size_t max_waiting = 16;  ///< That have to be simulated; more are answered with an error at once.
-  std::size_t max_unread = 64;   ///< Come, but not looked at yet; more are answered with an error.
-  std::size_t max_unread_bytes = 4u << 20;
+  /// Questions that wait to be simulated; more are answered with an error that names the bound.
+  FairLimits waiting = {16, 64, std::size_t{16} << 20};
+  /// Come, but not looked at yet; more are answered with such an error, too.
+  FairLimits unread = {64, 256, std::size_t{4} << 20};
+  int at_once = 2;               ///< Questions, of different clients, that are simulated at a time; >= 1.
   double default_seconds = 0.8;  ///< Time that a question without limits of its own may take.
   double most_seconds = 10.0;    ///< Time that any question may take, and at most 2 s more.
   /// Memory that the instances of a question may take; what needs more is refused, or ends with fewer instances.
   std::size_t most_bytes = std::size_t{512} << 20;
-  /// Of belief::TimelineQuery, see queries::QueryContext; called on both threads.
+  /// Of belief::TimelineQuery, see queries::QueryContext; called on all threads.
   std::function<std::shared_ptr<const belief::ObservedTimeline>()> timeline = {};
-  /// Answers belief::ExplainQuestion with the answer's document, or says why not; called on the thread that simulates,
-  /// with the time that it has in `context`. Empty: such questions are refused.
+  /// Answers belief::ExplainQuestion with the answer's document, or says why not; called on one thread at a
+  /// time, with the time that it has in `context`. Empty: such questions are refused.
   std::function<core::Result<nlohmann::ordered_json>(const belief::ExplainQuestion& question,
                                                      const queries::QueryContext& context)>
       explain = {};
   /// Told how far the work on a question with an id is, as JSON: {"id", "fraction", "text", "seconds_left" (null while
-  /// there is no estimate)}. Called on the thread that simulates when work begins and some times a second after that;
+  /// there is no estimate)}. Called on the threads that simulate when work begins and some times a second after that;
   /// may be empty.
   std::function<void(const std::string& progress)> on_progress = {};
+  /// Told what is known so far of a question with an id and `"stream": true`: the answer's document with
+  /// `"final": false`. Called on the threads that simulate, before the answer, at most 20 times a second for each
+  /// question; may be empty.
+  std::function<void(const std::string& answer)> on_answer_so_far = {};
 };
 
 /// {"cancel": question, "id": id}, the latter optional.
@@ -75,7 +87,7 @@ struct QueryCounts {
 /// In the error of a question that came when too many waited.
 inline constexpr const char* kQuestionsWait = "questions wait already";
 
-/// The answer's text as JSON. Called on the worker's threads, on both at once.
+/// The answer's text as JSON. Called on the worker's threads, on several at once.
 using AnswerSink = std::function<void(const std::string& answer)>;
 
 class QueryWorker {
@@ -94,8 +106,8 @@ class QueryWorker {
   /// for its own. {"cancel": ID} ends the work on a question: one that waits is refused, one that is being simulated is
   /// answered from what was simulated until now. Such a request is answered itself only if it has an "id" of its own:
   /// {"id", "cancelled": ID}, or an error where no question with that id waits. One that finds no room counts as a
-  /// refused question. No exception leaves it.
-  void ask(std::string question_json);
+  /// refused question. `client` says who asks: clients take turns. No exception leaves it.
+  void ask(std::string question_json, std::string client = {});
 
   QueryCounts counts() const;
 
@@ -115,17 +127,33 @@ class QueryWorker {
     std::shared_ptr<const Question> question;  ///< Null: none.
     std::shared_ptr<core::Cancellation> end;
   };
+  /// What one of the threads that simulate works on, and for whom.
+  struct Simulating {
+    Work work;
+    std::string client;
+  };
+  /// Of a question that found no room.
+  struct Refusal {
+    std::string id;
+    core::Status reason;
+  };
   // No exception leaves these.
   void read_questions();
-  void read(const std::string& question_json);
+  void read(const std::string& question_json, const std::string& client);
   void cancel(const CancelRequest& request);
-  void simulate_questions();
+  void simulate_questions(std::size_t thread);
+  void note_no_room(const std::string& question_json, const core::Status& reason);
+  void end_threads();
+  /// With mutex_ held: the question with that id that waits or is worked on; null: there is none.
+  const Work* find_work(const std::string& id) const;
+  /// With mutex_ held: what comes next to be simulated.
+  std::optional<FairQueue<Work>::Entry> take_next();
   struct Reply {
     std::string text;
     bool is_answer = false;  ///< Else the reason why there is none.
   };
   /// Answers and counts; no exception leaves it, nor the four below.
-  void answer(const Question& question, const core::Cancellation& cancelled);
+  void answer(const Question& question, const core::Cancellation& cancelled, core::ThreadPool& pool);
   void refuse(const std::string& id, const core::Status& reason);
   /// In a handler, of an exception while `doing`.
   void refuse_after_exception(const std::string& id, const char* doing);
@@ -133,20 +161,21 @@ class QueryWorker {
   void send(const std::string& answer, std::uint64_t QueryCounts::*fate);
   /// In a handler: the question got no answer, because of the exception.
   void drop();
-  Reply reply_to(const Question& question, const core::Cancellation& cancelled);
+  Reply reply_to(const Question& question, const core::Cancellation& cancelled, core::ThreadPool& pool);
   /// Of the question with that id; empty where nobody is told.
   core::ProgressSink progress_of(const std::string& id) const;
+  std::function<void(const belief::Answer&)> so_far_of(const belief::Query& query) const;
   Reply reply_to(const belief::Query& query, const queries::QueryContext& context);
   Reply reply_to(const belief::ExplainQuestion& question, queries::QueryContext context,
                  const core::Cancellation& cancelled);
   /// In a handler, of an exception while `doing`: counts it as a failure unless the memory ended, and says what to
   /// refuse the question with.
   core::Status note_exception(const char* doing);
-  void take(std::string question_json);
+  void take(std::string question_json, const std::string& client);
 
   Backends& backends_;
-  core::ThreadPool pool_;
-  QueryWorkerSettings settings_;  // but for its seconds
+  std::vector<std::unique_ptr<core::ThreadPool>> pools_;  // one for each thread that simulates
+  QueryWorkerSettings settings_;                          // but for its seconds
   std::atomic<double> default_seconds_, most_seconds_;
   std::function<std::shared_ptr<const belief::Belief>()> snapshot_;
   AnswerSink on_answer_;
@@ -155,14 +184,14 @@ class QueryWorker {
 
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable read_changed_, simulate_changed_;
-  std::deque<std::string> unread_;
-  std::size_t unread_bytes_ = 0;
-  std::deque<std::string> too_many_;  // ids of questions that found no room
-  std::deque<Work> waiting_;
-  Work in_work_;
+  FairQueue<std::string> unread_;
+  std::deque<Refusal> too_many_;
+  FairQueue<Work> waiting_;
+  std::vector<Simulating> in_work_;  // of each thread that simulates
   QueryCounts counts_;
 
-  std::thread reader_, simulator_;  // last: they use all above
+  std::thread reader_;  // these last: they use all above
+  std::vector<std::thread> simulators_;
 };
 
 /// {"id": `id` unless it is empty, "error": why, "code": ...}, see belief::error_to_json.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -21,23 +22,32 @@ double seconds_to_wait(const nlohmann::ordered_json& question);
 
 class QuestionClient {
  public:
+  /// Who is told while the service works on a question, on a thread of the client; each may be empty.
+  struct Sinks {
+    core::ProgressSink progress;
+    /// Of a question with `"stream": true`: the answer so far as JSON, whenever there is more to tell. None comes after
+    /// the answer.
+    std::function<void(const std::string& answer)> so_far;
+  };
+
   static core::Result<std::unique_ptr<QuestionClient>> create(const interfaces::DdsOptions& dds,
                                                               const core::LogSink& log);
   ~QuestionClient();
 
   /// Sends a question (JSON; an id is added if it has none) as soon as a service is there, and waits for its answer. A
   /// service that starts again meanwhile is asked again; one whose answer nobody waits for any more is told to cancel
-  /// the question. `progress`: called on a thread of the client while the service works on it; may be empty. May be
+  /// the question. May be
   /// called from several threads at once, with ids of their own. Fails with kUnavailable after `timeout` s (no service,
   /// no answer, or the middleware took no question), kInvalidInput when the question is not a JSON object, its id is no
   /// text, or another thread waits for an answer with its id, kCancelled.
   core::Result<std::string> ask(const std::string& question_json, double timeout,
-                                const core::Cancellation& cancellation, const core::ProgressSink& progress = {});
+                                const core::Cancellation& cancellation, const Sinks& sinks = {});
 
  private:
   QuestionClient() = default;
 
   class Waiting;
+  void note_answer(const std::string& text);
   void note_progress(const nlohmann::ordered_json& said);
   core::Status cancel(const std::string& id);
 
@@ -45,7 +55,7 @@ class QuestionClient {
   std::condition_variable changed_;
   struct Told {
     std::mutex mutex;  // guards what follows; not held while mutex_ is taken
-    core::ProgressSink progress;
+    Sinks sinks;
   };
   struct Waited {
     std::optional<std::string> answer;  // nothing until it came

@@ -17,6 +17,12 @@
 //   std::vector<Variable> variables = variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
 //   OutcomeEstimate estimate = estimate_outcomes(simulator, starts, variables, request, stream, options, pool);
 //   ... estimate.variables[0].classes[0].probability
+//
+// With EstimatorOptions::on_look, what is known is told while the work goes on: after the first 32 instances and at
+// each growth of the net. Whoever looks again and again, and stops when they like what they see, is not deceived: the
+// k-th look has the share 1 / (k (k + 1)) of the tolerated error, so that the intervals of all looks hold together with
+// the wanted confidence, as far as each interval holds alone (Bonferroni's inequality). They are wider than the
+// estimate's.
 #pragma once
 
 #include <functional>
@@ -50,6 +56,7 @@ std::vector<Variable> variables_of(const std::shared_ptr<const belief::Scene>& s
                                    std::vector<belief::ExclusiveOutcomes> exclusive_outcomes);
 
 class Certifier;
+struct OutcomeEstimate;
 
 struct EstimatorOptions {
   double tolerance = 0.02;             ///< Half width of the intervals at which to stop, > 0.
@@ -67,6 +74,9 @@ struct EstimatorOptions {
   std::size_t bytes_of_runs = std::size_t{256} << 20;
   double audit_share = 0.02;         ///< Of the decided instances that are run to rest all the same, in [0, 1].
   double tolerated_mismatch = 0.01;  ///< Share of the audited with another class beyond which nothing is certified.
+  /// Told what is known so far, with the intervals of a look (top of this file); not where nothing is random. From the
+  /// calling thread; may be empty. Does not change results.
+  std::function<void(const OutcomeEstimate& so_far)> on_look = {};
 };
 
 /// One simulated instance, without its path. Run it again with `run_instance` for that.
