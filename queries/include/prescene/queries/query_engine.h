@@ -10,7 +10,8 @@
 // Questions of eight kinds (belief::Query): `where` is everything, how are things related now (`relations`) and in
 // what was observed (`timeline`): actual belief; what happens if (`predict`), does it stay (`stability`): state
 // anticipation; what will the camera see (`view`), and from where would it see what is not known yet (`next_view`):
-// observation anticipation; how must it be done, so that an outcome comes about (`achieve`): state explanation. docs/reference/queries.md says what the answers mean.
+// observation anticipation; how must it be done, so that an outcome comes about (`achieve`): state explanation.
+// docs/reference/queries.md says what the answers mean.
 #pragma once
 
 #include <cstddef>
@@ -31,8 +32,8 @@ namespace prescene::queries {
 
 /// What answering takes; made by whoever chooses backends.
 struct QueryContext {
-  /// Of the scene to simulate: the belief's, with its objects where the belief has them. Needed by all but `where` and `next_view`;
-  /// steps of another length only where PredictDetail::model_error is asked for.
+  /// Of the scene to simulate: the belief's, with its objects where the belief has them. Needed by all but `where` and
+  /// `next_view`; steps of another length only where PredictDetail::model_error is asked for.
   simulation::SimulatorFactory make_simulator;
   /// MechanicsOptions::edge_rounding of those simulators, m.
   double edge_rounding = simulation::MechanicsOptions{}.edge_rounding;
