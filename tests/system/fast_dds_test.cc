@@ -82,7 +82,7 @@ TEST(FastDds, ARobotOnFastDdsIsServed) {
     ASSERT_TRUE(summary.ok()) << summary.status().message() << "\n" << line;
     ASSERT_EQ(summary->objects.size(), 1u);
     EXPECT_EQ(summary->stamp_ns, stamp_ns);
-    beliefs.push_back({(summary->objects[0].X_WO.translation() - truth).norm(), truth.y()});
+    beliefs.push_back({(summary->objects[0].X_WO.translation - truth).norm(), truth.y()});
   }
 
   // Where it stood at first, and where it was pushed to: 5 cm apart, far beyond the bound.
