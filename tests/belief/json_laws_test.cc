@@ -163,7 +163,7 @@ TEST(AnswerToJson, HasTheKeysThatTheCommandLinePromises) {
   predict.instances = 512;
   predict.simulated_seconds = 3.5;
   predict.wall_seconds = 0.1;
-  const Json json = to_json(Answer{"7", 3, {}, predict});
+  const Json json = to_json(Answer{"7", 3, {}, {}, predict});
   EXPECT_EQ(json["id"], "7");
   EXPECT_EQ(json["predict"]["outcomes"][0]["name"], "in");
   EXPECT_EQ(json["predict"]["outcomes"][0]["group"], "where");
@@ -190,7 +190,7 @@ TEST(JsonLaws, ErrorsOfAnswersKeepTheirCodeAndText) {
       EXPECT_EQ(error_from_json(json), answer.error) << json;
     }
   }
-  EXPECT_TRUE(error_from_json(to_json(Answer{"8", 0, {}, WhereAnswer{}})).ok());
+  EXPECT_TRUE(error_from_json(to_json(Answer{"8", 0, {}, {}, WhereAnswer{}})).ok());
 }
 
 TEST(ErrorFromJson, TakesErrorsOfOthersForBadInput) {
@@ -204,12 +204,12 @@ TEST(ErrorFromJson, TakesErrorsOfOthersForBadInput) {
 
 TEST(AnswerToJson, TellsWhoSimulatedAndWhyNotInLockstep) {
   PredictAnswer predict;
-  EXPECT_FALSE(to_json(Answer{"", 0, {}, predict})["predict"].contains("stepper"));
+  EXPECT_FALSE(to_json(Answer{"", 0, {}, {}, predict})["predict"].contains("stepper"));
   predict.stepper = "lockstep";
-  EXPECT_EQ(to_json(Answer{"", 0, {}, predict})["predict"]["stepper"], Json::parse(R"({"name": "lockstep"})"));
+  EXPECT_EQ(to_json(Answer{"", 0, {}, {}, predict})["predict"]["stepper"], Json::parse(R"({"name": "lockstep"})"));
   predict.stepper = "bullet";
   predict.not_lockstep = "five objects";
-  EXPECT_EQ(to_json(Answer{"", 0, {}, predict})["predict"]["stepper"],
+  EXPECT_EQ(to_json(Answer{"", 0, {}, {}, predict})["predict"]["stepper"],
             Json::parse(R"({"name": "bullet", "not_lockstep": "five objects"})"));
 }
 
@@ -222,7 +222,7 @@ TEST(AnswerToJson, TellsWhatStabilityRestsOn) {
   stability.stopped = "converged";
   stability.stepper = "lockstep";
   stability.remarks = {"3 of 64 instances failed"};
-  const Json json = to_json(Answer{"", 0, {}, stability})["stability"];
+  const Json json = to_json(Answer{"", 0, {}, {}, stability})["stability"];
   EXPECT_EQ(json["instances"], 64);
   EXPECT_EQ(json["failed_instances"], 3);
   EXPECT_EQ(json["converged"], true);
@@ -235,7 +235,7 @@ TEST(AnswerToJson, WritesImagesInBase64) {
   ViewAnswer view;
   view.depth = geometry::DepthImage(2, 1, 1.0F);  // 00 00 80 3f twice
   view.labels = geometry::LabelImage(1, 1, std::uint16_t{0x0102});
-  const Json json = to_json(Answer{"", 0, {}, view})["view"];
+  const Json json = to_json(Answer{"", 0, {}, {}, view})["view"];
   EXPECT_EQ(json["depth"]["base64"], "AACAPwAAgD8=");
   EXPECT_EQ(json["labels"]["base64"], "AgE=");
   EXPECT_EQ(json["depth"]["encoding"], "32FC1");
@@ -247,7 +247,7 @@ TEST(AnswerToJson, WritesCompactImagesInWholeNumbers) {
   view.depth = geometry::DepthImage(1, 1, 0.513F);            // 513 mm = 01 02 in little-endian order
   view.depth_deviation = geometry::DepthImage(1, 1, 100.0F);  // more than 16 bits hold
   view.presence = geometry::Image<float>(1, 1, 1.0F);
-  const Json json = to_json(Answer{"", 0, {}, view})["view"];
+  const Json json = to_json(Answer{"", 0, {}, {}, view})["view"];
   EXPECT_EQ(json["depth"]["encoding"], "16UC1");
   EXPECT_EQ(json["depth"]["scale"], 0.001);
   EXPECT_EQ(json["depth"]["base64"], "AQI=");
