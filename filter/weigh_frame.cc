@@ -87,8 +87,7 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
                   stream.at(belief.step, static_cast<std::uint32_t>(object)), seen.particles, context);
   if (report.all_impossible) step.result.degraded |= kImpossibleWeights;
   // What looks like the top of something inside a support is the support.
-  Pose followed = belief::heaviest(seen.particles).X_WO;
-  followed.translation -= context.support_offset * frame.up_W;
+  const Pose followed = clear_of_support(belief::heaviest(seen.particles).X_WO, context.support_offset, frame.up_W);
   if (frame.surfaces->overlap(*target.mesh, followed, settings_.weight.support_tolerance) > kMostInSupport)
     report.evidence_per_pixel = std::min(0.0, report.evidence_per_pixel);
   // What is hidden is not distinguished by its turn.

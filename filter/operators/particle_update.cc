@@ -205,11 +205,14 @@ double ParticleUpdate::log_overlap(const belief::Particle& particle) const {
   return kLogInSupport * std::min(1.0, overlap / kFullOverlap);
 }
 
+Pose clear_of_support(const Pose& X_WO, double support_offset, const Vector3d& up_W) {
+  return {X_WO.rotation, X_WO.translation + (kSunkAllowed - support_offset) * up_W};
+}
+
 double ParticleUpdate::log_in_support(const Pose& X_WO) const {
   if (context_.supports == nullptr || context_.supports->empty()) return 0.0;
-  Pose beside = X_WO;
-  beside.translation -= context_.support_offset * context_.up_W;
-  const double overlap = context_.supports->overlap(*target_.mesh, beside, options_.support_tolerance);
+  const double overlap = context_.supports->overlap(
+      *target_.mesh, clear_of_support(X_WO, context_.support_offset, context_.up_W), options_.support_tolerance);
   return kLogInSupport * std::min(1.0, overlap / kFullOverlap);
 }
 

@@ -28,3 +28,7 @@ namespace prescene::belief::given_belief::joint_h {
 extern const Pose X_WP, X_WC;
 extern const Twist V_WC;
 }  // namespace prescene::belief::given_belief::joint_h
+
+namespace prescene::belief::given_belief::next_view_h {
+extern const Pose X_WL, X_WR;
+}  // namespace prescene::belief::given_belief::next_view_h

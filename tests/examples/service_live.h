@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "prescene/core/log.h"
@@ -10,6 +11,8 @@
 #include "prescene/service/backends.h"
 #include "prescene/service/live/doctor.h"
 #include "prescene/service/live/node_parameters.h"
+#include "prescene/service/live/planning_scene.h"
+#include "prescene/service/tracking/tracker.h"
 
 namespace prescene::service::given_service_live {
 
@@ -27,5 +30,18 @@ namespace node_parameters_h {
 extern std::vector<NodeParameter> parameters;
 extern const interfaces::RosSetParametersRequest request;
 }  // namespace node_parameters_h
+
+namespace belief_events_h {
+extern const BeliefSummary summary;
+extern const std::shared_ptr<const belief::Belief> belief;
+extern const StepNews news;
+}  // namespace belief_events_h
+
+namespace planning_scene_h {
+extern const BeliefSummary summary;
+extern const std::shared_ptr<const belief::Belief> belief;
+extern const int readers;
+void publish(const interfaces::RosCollisionObject& message);
+}  // namespace planning_scene_h
 
 }  // namespace prescene::service::given_service_live

@@ -338,7 +338,9 @@ TEST_F(LiveServiceTest, ALoopPlaysTheSameStampsAgainUntilItIsStopped) {
   core::Cancellation enough(never, core::Cancellation::Clock::now() + std::chrono::minutes(1));
   const auto stamp_of = [](const interfaces::ReceivedMessage& message) -> core::TimeNs {
     const auto image = interfaces::decode_cdr<interfaces::RosImage>(message.cdr);
-    return image ? interfaces::to_stamp_ns(image->header.stamp).value_or(-1) : -1;
+    if (!image) return -1;
+    const auto stamp = interfaces::to_stamp_ns(image->header.stamp);
+    return stamp ? *stamp : -1;
   };
   std::vector<core::TimeNs> heard;  // of the node's thread, until it is stopped
   int returns = 0;

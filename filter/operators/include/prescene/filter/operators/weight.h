@@ -50,6 +50,13 @@ struct ParticleWeight {
   bool hidden = false;
 };
 
+/// m; how deep the middle of a seen thing may be in a support: poses and supports are not known better, and the middle
+/// of what is thin is no higher above it than that.
+inline constexpr double kSunkAllowed = 0.005;
+/// A seen pose as it is compared with the supports: against where the frame shows them (WeightContext::support_offset),
+/// and lifted by what is allowed.
+Pose clear_of_support(const Pose& X_WO, double support_offset, const Vector3d& up_W);
+
 /// What is known of the object besides the frame.
 struct WeightContext {
   const SupportSurfaces* supports = nullptr;  ///< Where no pose can be; null = anywhere.

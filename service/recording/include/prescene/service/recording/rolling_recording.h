@@ -53,7 +53,7 @@ struct PartLimits {
 };
 
 struct RollingOptions {
-  PartLimits part;
+  PartLimits part = {};
   RecordingSafety safety = kLiveRecording;
   /// s between two tries to begin a new file after writing failed.
   double pause = 10.0;
