@@ -9,6 +9,7 @@ recording is closed.
 """
 import os
 import shlex
+import sys
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
@@ -33,11 +34,18 @@ def command(value_of):
     for name in ARGUMENTS:
         if value_of(name):
             words += ['--' + name, value_of(name)]
-    if value_of('use_sim_time').lower() in ('true', '1'):
+    sim_time = value_of('use_sim_time').lower()
+    if sim_time not in ('true', '1', 'false', '0'):
+        raise ValueError(f"use_sim_time is '{value_of('use_sim_time')}': give true or false")
+    if sim_time in ('true', '1'):
         words.append('--use-sim-time')
     # Without it, `ros2 node list` and `ros2 param` don't see the node.
-    if os.environ.get('ROS_DISTRO') in DISTROS:
-        words += ['--ros-distro', os.environ['ROS_DISTRO']]
+    distro = os.environ.get('ROS_DISTRO', '')
+    if distro in DISTROS:
+        words += ['--ros-distro', distro]
+    elif distro:
+        print(f'prescene.launch.py: ROS_DISTRO is {distro}, not one of {", ".join(DISTROS)}: '
+              'topics work, but `ros2 node list` will not show the node', file=sys.stderr)
     return words + shlex.split(value_of('options'))
 
 

@@ -122,7 +122,7 @@ Verb add_serve_verb(CLI::App& app) {
       ->check(number_between(1e-3, 3600.0))
       ->capture_default_str();
   verb->add_option("--most-question-seconds", options->settings.worker.most_seconds,
-                   "Time that any question may take, s; they are answered one after the other")
+                   "Time that any question may take, s; of one client, one is simulated at a time")
       ->check(number_between(1e-3, 3600.0))
       ->capture_default_str();
   verb->add_option("--history", options->settings.frames.seconds,

@@ -181,7 +181,7 @@ void VerbContext::print(const nlohmann::ordered_json& document, const std::strin
 void VerbContext::print_line(const nlohmann::ordered_json& document, const std::string& text) {
   end_progress();
   write_out(options_.json ? belief::json_text(document) + "\n" : text);
-  printed_ = true;
+  printed_lines_ = true;
 }
 
 void VerbContext::write_out(const std::string& out) {
@@ -191,7 +191,10 @@ void VerbContext::write_out(const std::string& out) {
 
 ExitCode VerbContext::finish(const std::string& verb, core::Status status) {
   end_progress();
-  if (!status.ok() && options_.json && !printed_) write_out(error_document(status));
+  if (!status.ok() && options_.json && !printed_) {
+    // Where each document is a line, the error is one, too.
+    write_out(printed_lines_ ? belief::json_text(belief::error_to_json(status)) + "\n" : error_document(status));
+  }
   if (print_failed_) {
     const std::string text = "standard output can't be written: is the disk full, or was the pipe closed?";
     if (status.ok())

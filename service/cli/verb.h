@@ -69,7 +69,7 @@ class VerbContext {
   /// One of several: with --json, each document is a line of its own.
   void print_line(const nlohmann::ordered_json& document, const std::string& text);
   /// The verb's end: what went wrong to stderr, and with --json as error_document() to stdout where nothing was
-  /// printed. Output that could not be written (a full disk, a closed pipe) is a failure too.
+  /// printed, or as one more line. Output that could not be written (a full disk, a closed pipe) is a failure too.
   ExitCode finish(const std::string& verb, core::Status status);
 
  private:
@@ -81,6 +81,7 @@ class VerbContext {
   std::unique_ptr<core::ThreadPool> pool_;
   bool bar_open_ = false;
   bool printed_ = false;
+  bool printed_lines_ = false;
   bool print_failed_ = false;
 };
 

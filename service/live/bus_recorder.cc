@@ -6,12 +6,22 @@
 #include <string>
 
 #include "prescene/core/clock.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/live/inbox.h"
+#include "prescene/service/outside_json.h"
 #include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/camera_presets.h"
+#include "prescene/service/tracking/topics.h"
 
 namespace prescene::service {
 namespace {
+
+/// What is known until a question's answer comes.
+bool is_answer_so_far(const interfaces::ReceivedMessage& message) {
+  if (message.topic != kAnswerTopic) return false;
+  const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
+  return text && text_is_so_far(text->data);
+}
 
 constexpr std::chrono::milliseconds kWriteInterval(100);
 // What may wait for the disk: two seconds of images of 640 x 480 at 30 Hz.
@@ -56,7 +66,7 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
       // Never back, so that the order by time is the order of arrival.
       message.received_ns = last_ns = std::max(last_ns, message.received_ns);
       std::erase_if(waits_for, [&](const CameraInput& camera) { return camera.topics.depth == message.topic; });
-      if (are_of_objects(message)) continue;  // what a service made of all the rest
+      if (are_of_objects(message) || is_answer_so_far(message)) continue;  // what a service made of all the rest
       ++messages;
       try {
         recording.write(message);

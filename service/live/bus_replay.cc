@@ -5,10 +5,12 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -184,18 +186,32 @@ core::Status validate(const BusReplayOptions& options) {
   return core::ok_status();
 }
 
-/// Robot topics only: what the recording's own service said, and what it was set to, is not said again; nor are the
-/// parameters of the robot's nodes, which no service reads.
+/// Robot topics only: what a service said, and what it was set to, is not said again. A bag that others recorded of a
+/// service does not tell its topics apart, but by their names.
 bool is_robots(const RecordedEntry& entry) {
   const std::string& topic = entry.message.topic;
-  return !entry.is_json && topic != kQueryTopic && topic != kAnswerTopic && topic != kSettingsTopic &&
-         entry.message.type != "rcl_interfaces/msg/ParameterEvent" && !are_of_objects(entry.message);
+  return !entry.is_json && (topic == kControlTopic || !topic.starts_with("/prescene/")) &&
+         !are_of_objects(entry.message);
 }
 
-/// The publisher of a topic; none of a type that no service of ours reads, as bags of robots have many.
+/// Whether a service of ours reads messages of the type from robots.
+bool is_read(const std::string& type) {
+  static constexpr std::string_view kRead[] = {"sensor_msgs/msg/Image",       "sensor_msgs/msg/CompressedImage",
+                                               "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/CameraInfo",
+                                               "sensor_msgs/msg/JointState",  "tf2_msgs/msg/TFMessage",
+                                               "std_msgs/msg/String",         "rosgraph_msgs/msg/Clock"};
+  return std::find(std::begin(kRead), std::end(kRead), type) != std::end(kRead);
+}
+
+/// The publisher of a topic; none of a type that no service of ours reads, as bags of robots have many: nobody would
+/// listen, or somebody else's planner would.
 core::Result<std::optional<DdsPublisher>> publisher_for(const interfaces::ReceivedMessage& message, BusPlayer& player,
                                                         std::set<std::string>& passed_over) {
   if (passed_over.contains(message.topic)) return std::optional<DdsPublisher>();
+  if (!is_read(message.type)) {
+    passed_over.insert(message.topic);
+    return std::optional<DdsPublisher>();
+  }
   const auto publisher = player.publisher_of(message);
   if (publisher) return std::optional<DdsPublisher>(*publisher);
   if (publisher.status().code() != core::StatusCode::kUnsupported) return publisher.status();

@@ -113,9 +113,11 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
     impl->settings.worker.on_progress = [raw, topic = *progress](const std::string& text) {
       raw->check_sent(raw->node->publish(topic, interfaces::RosString{text}));
     };
-  // By the answers' own writer, so that none comes after the answer. They are not recorded: the answer is.
+  // By a writer of their own that never waits: whoever does not read them keeps nobody's answer. One that comes after
+  // its answer is passed over by who asked. They are not recorded: the answer is.
+  PRESCENE_TRY(impl->answers_so_far, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kState));
   impl->settings.worker.on_answer_so_far = [raw](const std::string& answer) {
-    raw->check_sent(raw->node->publish(raw->answers, interfaces::RosString{answer}));
+    raw->check_sent(raw->node->publish(raw->answers_so_far, interfaces::RosString{answer}));
   };
   impl->history = std::make_unique<HistoryKeeper>(backends, settings.history);
   impl->settings.worker.timeline = [raw] { return raw->history->timeline(); };

@@ -134,7 +134,7 @@ struct LiveService::Impl {
   FrameHistory frames;  // for questions what happened
   RateLimit learned_limit;
 
-  interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers;
+  interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers, answers_so_far;
   std::optional<interfaces::DdsPublisher> transforms, all_poses, events_topic, collisions;
   BeliefEvents events;
   PlanningScene planning;

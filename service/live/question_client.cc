@@ -65,7 +65,7 @@ core::Result<std::unique_ptr<QuestionClient>> QuestionClient::create(const inter
   // Without the log: a small receive buffer costs a client but time, as its topics are reliable.
   PRESCENE_TRY(client->node_, interfaces::DdsNode::create(options, {}));
   PRESCENE_RETURN_IF_ERROR(
-      client->node_->subscribe(kAnswerTopic, "std_msgs/msg/String", interfaces::TopicQos::kReliable,
+      client->node_->subscribe(kAnswerTopic, "std_msgs/msg/String", interfaces::TopicQos::kCommands,
                                [raw, log](interfaces::ReceivedMessage&& message) {
                                  const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
                                  if (!text) return core::log(log, core::LogLevel::kWarning, text.status().message());

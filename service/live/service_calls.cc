@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
@@ -94,7 +95,14 @@ std::vector<interfaces::ServiceRequest> ServiceCalls::give_up_old(std::uint64_t 
   const bool own_are_too_many =
       static_cast<std::size_t>(std::count_if(waiting_.begin(), waiting_.end(), is_own)) > kMostOfOne;
   if (!own_are_too_many && waiting_.size() <= kMostWaiting) return dropped;
-  const auto old = own_are_too_many ? std::find_if(waiting_.begin(), waiting_.end(), is_own) : waiting_.begin();
+  // Where all together are too many, whoever has most gives way.
+  std::map<std::uint64_t, std::size_t> calls;
+  for (const auto& call : waiting_) ++calls[call.second.client];
+  const auto fewer = [](const auto& a, const auto& b) { return a.second < b.second; };
+  const std::uint64_t most = std::max_element(calls.begin(), calls.end(), fewer)->first;
+  const auto old = std::find_if(waiting_.begin(), waiting_.end(), [&](const auto& call) {
+    return call.second.client == (own_are_too_many ? client : most);
+  });
   dropped.push_back(old->second);
   waiting_.erase(old);
   ++given_up_;

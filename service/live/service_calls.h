@@ -52,7 +52,8 @@ class ServiceCalls {
  private:
   /// Has a question answered by note_answer(); `question` is JSON.
   void ask(const interfaces::ServiceRequest& request, const std::string& question);
-  /// With mutex_ held: gives up the oldest calls where too many wait, of one caller or in all.
+  /// With mutex_ held: gives up the oldest call of the caller where too many of it wait, or of whoever
+  /// has most where too many wait in all.
   std::vector<interfaces::ServiceRequest> give_up_old(std::uint64_t client);
 
   interfaces::DdsNode& node_;

@@ -148,7 +148,7 @@ core::Status BusView::Impl::join() {
       subscribe(kMarkersTopic, "visualization_msgs/msg/MarkerArray", TopicQos::kState, &Impl::take_markers));
   PRESCENE_RETURN_IF_ERROR(
       subscribe(kDiagnosticsTopic, "diagnostic_msgs/msg/DiagnosticArray", TopicQos::kState, &Impl::take_health));
-  return node->subscribe(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable, [this](ReceivedMessage&& message) {
+  return node->subscribe(kAnswerTopic, "std_msgs/msg/String", TopicQos::kCommands, [this](ReceivedMessage&& message) {
     const auto answer = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
     if (answer && !text_is_so_far(answer->data)) view->answer(answer->data);
   });

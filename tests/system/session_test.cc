@@ -202,7 +202,7 @@ TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
     EXPECT_EQ(run_program({"ask", "stability", "nobody"}, bus_).exit_code, 2);
     const Finished viewed = run_program({"ask", "--question", R"({"view": {"time": 0}})"}, bus_);
     EXPECT_EQ(viewed.exit_code, 0) << viewed.err;
-    EXPECT_NE(viewed.out.find("bytes, with --json"), std::string::npos) << viewed.out.substr(0, 2000);
+    EXPECT_NE(viewed.out.find("--images FOLDER writes them"), std::string::npos) << viewed.out.substr(0, 2000);
     EXPECT_LT(viewed.out.size(), 5000u) << "images are left out of the text";
     // A question that is refused, and one for a time after the recording's end.
     const Finished refused = run_program({"replay", path("run.mcap"), "--over-dds", "--json", "--speed", "10", "--ask",

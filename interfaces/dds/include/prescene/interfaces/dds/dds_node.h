@@ -67,7 +67,8 @@ enum class TopicQos {
   kState,     ///< As kReliable, but a writer never waits: for state that the next sample replaces (poses, markers).
   kEvents,    ///< As kState, keep last 1000: changes of parameters.
   kChanges,   ///< As kState, keep last 100: changes, none of which replaces another.
-  kCommands,  ///< As kReliable, keep last 100: readers of questions and controls, none of which replaces another.
+  kCommands,  ///< As kReliable, keep last 100: readers of questions, answers and controls, none of which replaces
+              ///< another.
   kTf,        ///< Reliable, keep last 100; a reader does not get what writers of its own node send.
   kLatched,   ///< Reliable, transient local, keep last 1 (/tf_static writers, descriptions).
   kTfStatic,  ///< Reader of /tf_static: reliable, transient local, keep last 100.
