@@ -5,13 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "prescene/filter/proposals/frame.h"
+#include "prescene/queries/view_information.h"
 #include "prescene/rendering/sensor/pixel_grid.h"
-#include "view_information.h"
 
 namespace prescene::queries {
 namespace {
@@ -22,9 +24,20 @@ using geometry::Vector3d;
 
 // As alternatives of `where` (prescene/belief/alternative_poses.h).
 constexpr double kOnePlaceRadius = 0.05, kOneTurnAngle = 0.5236, kLeastShare = 0.01;
+// Twice those of `where`. Hypotheses share the draws: the more there are, the fewer circumstances weigh each image.
 constexpr std::size_t kMostPlaces = 8;
-constexpr std::size_t kFewestCircumstances = 2;
+// A standard error from so few is itself right within about 27 % (1 / sqrt(2 (n - 1))), and each image is weighed with
+// seven others. With 2, an image is weighed by one other circumstance, which is hardly ever near.
+constexpr std::size_t kFewestCircumstances = 8;
 constexpr double kFewestTemperingPixels = 12.0;  // as of the filter's weights
+// The filter takes 80 x 60 pixels of usual cameras, and at most this many of one on its side. Of longer images the
+// filter would take more: they are reduced further here.
+constexpr std::int64_t kMostPixels = 4 * 80 * 60;
+// Pixels compared with all images, of all candidates: about two minutes of one processor. The default number of draws
+// with the most candidates takes a third of it.
+constexpr double kMostComparisons = 4e9;
+// A reduction of this share of the entropy is all that can be told of the hypotheses.
+constexpr double kAllTold = 0.99;
 
 struct StateDraw {
   belief::WorldState state;
@@ -305,6 +318,94 @@ const char* what_is_asked(ViewAbout about) {
   return "whether it is there";
 }
 
+/// What is drawn of a candidate.
+struct ReducedCamera {
+  geometry::PinholeCamera camera;
+  int step = 1;  ///< Full-image pixels between two of its pixels.
+
+  std::int64_t pixels() const { return std::int64_t{camera.width} * camera.height; }
+};
+
+/// As the filter's, unless its area is larger than that of any usual camera.
+ReducedCamera reduced(const geometry::PinholeCamera& full) {
+  ReducedCamera result;
+  result.step = rendering::pixel_step(full.width, rendering::FrameTermsOptions{}.target_width);
+  const auto at_step = [&] {
+    result.camera = full.subsampled(result.step, rendering::pixel_offset(result.step, full.width, full.height));
+    return result.pixels();
+  };
+  while (at_step() > kMostPixels) ++result.step;
+  return result;
+}
+
+/// Memory of the largest candidate's images, and work for all candidates.
+core::Status check_effort(const std::vector<ReducedCamera>& cameras, std::size_t images, std::size_t most_bytes) {
+  std::int64_t most = 0, all = 0;
+  for (const ReducedCamera& camera : cameras) {
+    most = std::max(most, camera.pixels());
+    all += camera.pixels();
+  }
+  const double count = static_cast<double>(images);
+  const double bytes = count * (static_cast<double>(most) * sizeof(ExpectedSurface) + count * sizeof(double));
+  if (bytes > static_cast<double>(most_bytes))
+    return core::resource_exhausted(std::to_string(images) + " simulated images of " + std::to_string(most) +
+                                    " pixels would take " + std::to_string(std::lround(bytes / (1 << 20))) +
+                                    " MiB, and a question may take " + std::to_string(most_bytes >> 20) +
+                                    ": ask for fewer 'draws', or give smaller 'intrinsics'");
+  const double comparisons = static_cast<double>(all) * count * count;
+  if (comparisons > kMostComparisons)
+    return core::resource_exhausted(std::to_string(cameras.size()) + " candidates with " + std::to_string(images) +
+                                    " simulated images each would take up to " +
+                                    std::to_string(std::llround(comparisons / 1e6)) +
+                                    " million comparisons of pixels, and a question may take " +
+                                    std::to_string(std::llround(kMostComparisons / 1e6)) +
+                                    " million: give fewer 'views', or ask for fewer 'draws'");
+  return core::ok_status();
+}
+
+core::Status stopped_looking() {
+  return core::cancelled("stopped before all candidates were looked at: give fewer, or fewer draws");
+}
+
+/// Sets any_tells and best_is_clear, each of which is wrong with probability `error` at most, and remarks on them.
+void compare(const std::vector<ViewInformation>& informations, double error, belief::NextViewAnswer& answer) {
+  const auto information = [&](std::size_t rank) -> const ViewInformation& {
+    return informations[static_cast<std::size_t>(answer.views[rank].index)];
+  };
+  const auto clearly_above_zero = [&](std::span<const double> values, std::span<const double> weights, double range) {
+    const MeanInterval mean = mean_interval(values, weights, error / static_cast<double>(informations.size()), range);
+    return mean.mean - mean.half_width > 0.0;
+  };
+  const auto tells = [&](const ViewInformation& one) {
+    return one.different_pixels > 0 && clearly_above_zero(one.values, one.weights, answer.entropy);
+  };
+  answer.any_tells = std::ranges::any_of(informations, tells);
+  answer.best_is_clear = tells(information(0));
+  if (answer.best_is_clear && answer.views.size() > 1) {
+    // The same hypotheses and circumstances in both: differences scatter less than either.
+    std::vector<double> differences;
+    for (std::size_t i = 0; i < information(0).values.size(); ++i)
+      differences.push_back(information(0).values[i] - information(1).values[i]);
+    answer.best_is_clear = clearly_above_zero(differences, information(0).weights, 2.0 * answer.entropy);
+  }
+  if (!(answer.entropy > 0.0)) return;
+  const std::string asked = what_is_asked(answer.about);
+  if (std::ranges::all_of(informations, [](const ViewInformation& one) { return one.different_pixels == 0; }))
+    answer.remarks.push_back("No candidate tells anything about " + asked + ".");
+  else if (!answer.any_tells)
+    answer.remarks.push_back("No candidate clearly tells anything about " + asked +
+                             ": more draws may show whether one does.");
+  const auto all_told = std::ranges::count_if(
+      answer.views, [&](const auto& view) { return view.reduction >= kAllTold * answer.entropy; });
+  if (answer.about == ViewAbout::kPose && all_told > 0)
+    answer.remarks.push_back(
+        "The first candidate tells all drawn poses apart, so that its reduction is bounded by their number: ask with "
+        "more draws, or a coarser question, such as about place.");
+  else if (all_told > 1)
+    answer.remarks.push_back("The first " + std::to_string(all_told) + " candidates tell all there is to know about " +
+                             asked + ": their order means nothing.");
+}
+
 }  // namespace
 
 core::Result<belief::NextViewAnswer> next_view(const Prior& prior, const belief::NextViewQuery& query,
@@ -331,20 +432,19 @@ core::Result<belief::NextViewAnswer> next_view(const Prior& prior, const belief:
   if (!(answer.entropy > 0.0))
     answer.remarks.push_back(std::string("The belief has no doubt about ") + what_is_asked(query.about) +
                              ": no view can tell more.");
-  const double deviations = core::inverse_normal_cdf(0.5 + 0.5 * query.confidence);
+  std::vector<ReducedCamera> cameras;
+  for (const belief::CandidateView& view : query.views)
+    cameras.push_back(reduced(view.intrinsics ? *view.intrinsics : prior.scene->camera->intrinsics));
+  PRESCENE_RETURN_IF_ERROR(check_effort(cameras, imagining.states.size(), context.most_bytes));
   ImageMaker maker(prior, context, *renderer, model.options());
   std::vector<ViewInformation> informations;
   for (std::size_t v = 0; v < query.views.size(); ++v) {
     const belief::CandidateView& view = query.views[v];
-    const geometry::PinholeCamera& full = view.intrinsics ? *view.intrinsics : prior.scene->camera->intrinsics;
-    const int step = rendering::pixel_step(full.width, rendering::FrameTermsOptions{}.target_width);
-    const geometry::PinholeCamera camera =
-        full.subsampled(step, rendering::pixel_offset(step, full.width, full.height));
+    const auto& [camera, step] = cameras[v];
     std::vector<ExpectedImage> images;
     double visible = 0.0, there = 0.0;
     for (std::size_t i = 0; i < imagining.states.size(); ++i) {
-      if (context.cancellation && context.cancellation->requested())
-        return core::cancelled("stopped before all candidates were looked at: give fewer, or fewer draws");
+      if (context.cancellation && context.cancellation->requested()) return stopped_looking();
       double covered = 0.0;
       PRESCENE_TRY(ExpectedImage image, maker.image(imagining.states[i], camera, view.X_WC, object, &covered));
       images.push_back(std::move(image));
@@ -357,10 +457,13 @@ core::Result<belief::NextViewAnswer> next_view(const Prior& prior, const belief:
     PRESCENE_TRY(const ExpectedImage surroundings, maker.surroundings(camera, view.X_WC));
     const double tempering =
         rendering::tempering(rendering::TemperingOptions{}.weight, std::max(kFewestTemperingPixels, visible), step);
-    informations.push_back(information_of({imagining.probabilities, static_cast<int>(imagining.circumstances), images,
-                                           maker.materials(), &surroundings, tempering, step},
-                                          model, prior.stream.for_purpose(core::Purpose::kSensorNoise), deviations,
-                                          *context.pool));
+    std::optional<ViewInformation> told =
+        information_of({imagining.probabilities, static_cast<int>(imagining.circumstances), images, maker.materials(),
+                        &surroundings, tempering, step},
+                       model, prior.stream.for_purpose(core::Purpose::kSensorNoise), 1.0 - query.confidence,
+                       *context.pool, context.cancellation);
+    if (!told) return stopped_looking();
+    informations.push_back(*std::move(told));
     const ViewInformation& information = informations.back();
     answer.views.push_back({view.name, static_cast<int>(v), information.reduction, information.low, information.high,
                             static_cast<int>(std::lround(visible)), information.different_pixels});
@@ -369,22 +472,7 @@ core::Result<belief::NextViewAnswer> next_view(const Prior& prior, const belief:
                         std::to_string(v + 1) + " of " + std::to_string(query.views.size()) + " candidates looked at"});
   }
   std::ranges::stable_sort(answer.views, std::ranges::greater(), &belief::NextViewAnswer::View::reduction);
-  answer.any_tells = std::ranges::any_of(answer.views, [](const auto& view) { return view.low > 0.0; });
-  if (answer.views.front().low > 0.0) {
-    answer.best_is_clear = true;
-    if (answer.views.size() > 1) {
-      // The same hypotheses and circumstances in both: differences scatter less than either.
-      const ViewInformation& best = informations[static_cast<std::size_t>(answer.views[0].index)];
-      const ViewInformation& second = informations[static_cast<std::size_t>(answer.views[1].index)];
-      std::vector<double> differences;
-      for (std::size_t i = 0; i < best.by_image.size(); ++i)
-        differences.push_back(best.by_image[i] - second.by_image[i]);
-      const MeanInterval mean = mean_interval(differences, best.weights, deviations);
-      answer.best_is_clear = mean.mean - mean.half_width > 0.0;
-    }
-  }
-  if (!answer.any_tells && answer.entropy > 0.0)
-    answer.remarks.push_back(std::string("No candidate tells anything about ") + what_is_asked(query.about) + ".");
+  compare(informations, 1.0 - query.confidence, answer);
   return answer;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The entropy that is left is that of the filter's own posterior: weights from the sensor model's likelihood of the
-// image, tempered. Images are drawn from that sensor model pixel by pixel.
-#include "view_information.h"
+// Hypotheses are weighed by the sensor model's likelihood of the image, tempered, as the filter weighs particles.
+// Images are drawn from that sensor model pixel by pixel.
+#include "prescene/queries/view_information.h"
 
 #include <algorithm>
 #include <cmath>
@@ -28,15 +28,26 @@ bool look_alike(const ExpectedSurface& a, const ExpectedSurface& b) {
          std::abs(a.cosine - b.cosine) <= kSameCosine;
 }
 
-/// Where hypotheses differ under the same circumstances; elsewhere they cannot be told apart.
-std::vector<std::size_t> different_pixels(const LookedAt& seen) {
-  std::vector<std::size_t> pixels;
+/// Pixels of blocks, whose models are kept at a time: 3 MB with 256 images.
+constexpr std::size_t kBlock = 64;
+
+struct CountedPixels {
+  std::vector<std::size_t> compared;
+  int different = 0;  ///< Of them: hypotheses differ under the same circumstances.
+};
+
+/// Pixels at which only circumstances differ say which of these hold, and so which pixels to expect of each hypothesis.
+CountedPixels pixels_of(const LookedAt& seen) {
+  CountedPixels pixels;
   const auto circumstances = static_cast<std::size_t>(seen.circumstances);
   for (std::size_t p = 0; p < seen.images.front().size(); ++p) {
-    bool differs = false;
-    for (std::size_t i = circumstances; i < seen.images.size() && !differs; ++i)
-      differs = !look_alike(seen.images[i].data()[p], seen.images[i % circumstances].data()[p]);
-    if (differs) pixels.push_back(p);
+    bool any = false, different = false;
+    for (std::size_t i = 0; i < seen.images.size() && !different; ++i) {
+      any = any || !look_alike(seen.images[i].data()[p], seen.images.front().data()[p]);
+      different = !look_alike(seen.images[i].data()[p], seen.images[i % circumstances].data()[p]);
+    }
+    if (any || different) pixels.compared.push_back(p);
+    if (different) ++pixels.different;
   }
   return pixels;
 }
@@ -54,14 +65,15 @@ struct PixelDensity {
       const double t = (z - mean) * inverse;
       return top * std::exp(-0.5 * t * t);
     };
-    return std::log(gaussian(peak, depth, inverse_sigma) + gaussian(far_peak, far_depth, far_inverse_sigma) +
-                    (z < depth ? nearer : 0.0) + anywhere);
+    return std::log(std::max(1e-300, gaussian(peak, depth, inverse_sigma) +
+                                         gaussian(far_peak, far_depth, far_inverse_sigma) + (z < depth ? nearer : 0.0) +
+                                         anywhere));
   }
 };
 
 /// A pixel, as the sensor model draws it and as its density.
 struct ModelledPixel {
-  bool is_object = false;
+  bool is_nothing = false, is_object = false;
   PixelMixture mixture;
   AbsentMixture absent;
   PixelDensity density;
@@ -78,13 +90,14 @@ AbsentMixture surroundings_of(const ExpectedSurface& surface, const SensorModel&
   return absent;
 }
 
-/// `says_nothing`: a missing return says nothing there.
+/// `says_nothing`: a missing return is no evidence there, nor is a return in itself; they are as frequent as ever.
 ModelledPixel modelled(const ExpectedSurface& surface, const LookedAt& seen, std::size_t pixel,
                        const SensorModel& model, bool says_nothing) {
   constexpr double kRoot = std::numbers::inv_sqrtpi / std::numbers::sqrt2;
   ModelledPixel result;
   PixelDensity& density = result.density;
   const double range = model.range();
+  result.is_nothing = surface.kind == ExpectedSurface::Kind::kNothing;
   result.is_object = surface.kind == ExpectedSurface::Kind::kObject;
   result.absent = surroundings_of(result.is_object ? seen.surroundings->data()[pixel] : surface, model);
   const AbsentMixture& absent = result.absent;
@@ -112,13 +125,19 @@ ModelledPixel modelled(const ExpectedSurface& surface, const LookedAt& seen, std
       density.peak = absent.peak_weight * kRoot / absent.peak_sigma;
     }
   }
-  if (says_nothing) density.missing = result.mixture.missing = result.absent.missing = 0.0;
+  if (says_nothing) return result;
   density.log_missing = std::log(std::max(density.missing, 1e-12));
   density.log_returned = std::log1p(-density.missing);
   return result;
 }
 
-double log_sum(std::span<const double> logs) {
+/// m; 0 = missing.
+double drawn_depth(const ModelledPixel& pixel, const SensorModel& model, core::RandomStream& stream) {
+  if (pixel.is_nothing) return 0.0;
+  return pixel.is_object ? model.sample(pixel.mixture, pixel.absent, stream) : model.sample(pixel.absent, stream);
+}
+
+double log_sum(const std::vector<double>& logs) {
   const double most = *std::ranges::max_element(logs);
   double sum = 0.0;
   for (const double value : logs) sum += std::exp(value - most);
@@ -134,71 +153,94 @@ double entropy_of(std::span<const double> probabilities) {
   return sum;
 }
 
-MeanInterval mean_interval(std::span<const double> values, std::span<const double> weights, double deviations) {
+MeanInterval mean_interval(std::span<const double> values, std::span<const double> weights, double error,
+                           double range) {
   MeanInterval result;
-  for (std::size_t i = 0; i < values.size(); ++i) result.mean += weights[i] * values[i];
+  double squared_weights = 0.0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    result.mean += weights[i] * values[i];
+    squared_weights += weights[i] * weights[i];
+  }
   double squares = 0.0;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double off = weights[i] * (values[i] - result.mean);
     squares += off * off;
   }
   const auto n = static_cast<double>(values.size());
-  if (n > 1.0) result.half_width = deviations * std::sqrt(squares * n / (n - 1.0));
+  if (n > 1.0) result.half_width = core::inverse_normal_cdf(1.0 - 0.5 * error) * std::sqrt(squares * n / (n - 1.0));
+  result.half_width += range * std::log(2.0 / error) * squared_weights;  // 1 / n of equal weights
   return result;
 }
 
-ViewInformation information_of(const LookedAt& seen, const SensorModel& model, const core::RandomStream& stream,
-                               double deviations, core::ThreadPool& pool) {
-  const std::size_t hypotheses = seen.probabilities.size();
+std::optional<ViewInformation> information_of(const LookedAt& seen, const SensorModel& model,
+                                              const core::RandomStream& stream, double error, core::ThreadPool& pool,
+                                              const core::Cancellation* cancellation) {
+  const std::size_t hypotheses = seen.probabilities.size(), images = seen.images.size();
   const auto circumstances = static_cast<std::size_t>(seen.circumstances);
-  PRESCENE_CHECK(hypotheses > 0 && seen.images.size() == hypotheses * circumstances);
+  PRESCENE_CHECK(hypotheses > 0 && circumstances > 0 && images == hypotheses * circumstances);
   ViewInformation result;
-  result.by_image.assign(seen.images.size(), 0.0);
-  for (std::size_t i = 0; i < seen.images.size(); ++i)
-    result.weights.push_back(seen.probabilities[i / circumstances] / static_cast<double>(circumstances));
-  const std::vector<std::size_t> pixels = different_pixels(seen);
-  result.different_pixels = static_cast<int>(pixels.size());
-  if (pixels.empty()) return result;
+  if (circumstances > 1)
+    result.weights.assign(circumstances, 1.0 / static_cast<double>(circumstances));
+  else
+    result.weights.assign(seen.probabilities.begin(), seen.probabilities.end());
+  result.values.assign(result.weights.size(), 0.0);
+  const CountedPixels pixels = pixels_of(seen);
+  result.different_pixels = pixels.different;
+  if (pixels.different == 0) return result;
 
-  // By pixel, by image.
-  std::vector<ModelledPixel> models(pixels.size() * seen.images.size());
-  pool.for_each_index(pixels.size(), [&](std::size_t k) {
-    // Whether empty space returns nothing is not known: then neither outcome is evidence.
-    const bool says_nothing = std::ranges::any_of(seen.images, [&](const ExpectedImage& image) {
-      return image.data()[pixels[k]].kind == ExpectedSurface::Kind::kNothing;
+  std::vector<core::RandomStream> streams;  // by image
+  for (std::size_t i = 0; i < images; ++i) streams.push_back(stream.at(i));
+  std::vector<double> logs(images * images, 0.0);  // by the image that is drawn, by the image that it is weighed with
+  std::vector<ModelledPixel> models(std::min(kBlock, pixels.compared.size()) * images);
+  for (std::size_t begin = 0; begin < pixels.compared.size(); begin += kBlock) {
+    if (cancellation != nullptr && cancellation->requested()) return std::nullopt;
+    const std::size_t count = std::min(kBlock, pixels.compared.size() - begin);
+    pool.for_each_index(count, [&](std::size_t k) {
+      const std::size_t pixel = pixels.compared[begin + k];
+      // Whether empty space returns nothing is not known.
+      const bool says_nothing = std::ranges::any_of(seen.images, [&](const ExpectedImage& image) {
+        return image.data()[pixel].kind == ExpectedSurface::Kind::kNothing;
+      });
+      for (std::size_t i = 0; i < images; ++i)
+        models[k * images + i] = modelled(seen.images[i].data()[pixel], seen, pixel, model, says_nothing);
     });
-    for (std::size_t i = 0; i < seen.images.size(); ++i)
-      models[k * seen.images.size() + i] =
-          modelled(seen.images[i].data()[pixels[k]], seen, pixels[k], model, says_nothing);
-  });
-
-  const double before = entropy_of(seen.probabilities);
-  pool.for_each_index(seen.images.size(), [&](std::size_t truth) {
-    core::RandomStream draws = stream.at(truth);
-    std::vector<double> logs(seen.images.size(), 0.0);
-    for (std::size_t k = 0; k < pixels.size(); ++k) {
-      const ModelledPixel* const row = &models[k * seen.images.size()];
-      const ModelledPixel& true_pixel = row[truth];
-      const double z = true_pixel.is_object ? model.sample(true_pixel.mixture, true_pixel.absent, draws)
-                                            : model.sample(true_pixel.absent, draws);
-      for (std::size_t i = 0; i < logs.size(); ++i) {
-        const PixelDensity& density = row[i].density;
-        logs[i] += z > 0.0 ? density.log_returned + density.log_density(z) : density.log_missing;
+    pool.for_each_index(images, [&](std::size_t truth) {
+      double* const sums = &logs[truth * images];
+      for (std::size_t k = 0; k < count; ++k) {
+        const ModelledPixel* const row = &models[k * images];
+        const double z = drawn_depth(row[truth], model, streams[truth]);
+        for (std::size_t i = 0; i < images; ++i) {
+          const PixelDensity& density = row[i].density;
+          sums[i] += z > 0.0 ? density.log_returned + density.log_density(z) : density.log_missing;
+        }
       }
+    });
+  }
+
+  std::vector<double> of_circumstances, posterior(hypotheses);
+  for (std::size_t truth = 0; truth < images; ++truth) {
+    const std::size_t h_true = truth / circumstances, j_true = truth % circumstances;
+    const double p_true = seen.probabilities[h_true];
+    if (!(p_true > 0.0)) continue;
+    for (std::size_t h = 0; h < hypotheses; ++h) {
+      of_circumstances.clear();
+      for (std::size_t j = 0; j < circumstances; ++j)
+        if (j != j_true || circumstances == 1)
+          of_circumstances.push_back(seen.tempering * logs[truth * images + h * circumstances + j]);
+      posterior[h] = std::log(std::max(seen.probabilities[h], 1e-300)) + log_sum(of_circumstances);
     }
-    for (double& value : logs) value *= seen.tempering;
-    std::vector<double> posterior(hypotheses);
-    for (std::size_t h = 0; h < hypotheses; ++h)
-      posterior[h] = std::log(std::max(seen.probabilities[h], 1e-300)) +
-                     log_sum(std::span(logs).subspan(h * circumstances, circumstances));
-    const double all = log_sum(posterior);
-    for (double& value : posterior) value = std::exp(value - all);
-    result.by_image[truth] = before - entropy_of(posterior);
-  });
-  const MeanInterval mean = mean_interval(result.by_image, result.weights, deviations);
-  result.reduction = std::clamp(mean.mean, 0.0, before);
-  result.low = std::clamp(mean.mean - mean.half_width, 0.0, before);
-  result.high = std::clamp(mean.mean + mean.half_width, 0.0, before);
+    const double q_true = std::exp(posterior[h_true] - log_sum(posterior));
+    const double score = std::log((1.0 - kDistrust) * q_true + kDistrust * p_true) - std::log(p_true);
+    if (circumstances > 1)
+      result.values[j_true] += p_true * score;
+    else
+      result.values[h_true] = score;
+  }
+  const double entropy = entropy_of(seen.probabilities);
+  const MeanInterval mean = mean_interval(result.values, result.weights, error, entropy);
+  result.reduction = std::clamp(mean.mean, 0.0, entropy);
+  result.low = std::clamp(result.reduction - mean.half_width, 0.0, entropy);
+  result.high = std::clamp(result.reduction + mean.half_width, 0.0, entropy);
   return result;
 }
 

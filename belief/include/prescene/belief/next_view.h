@@ -53,8 +53,9 @@ struct NextViewAnswer {
   struct View {
     std::string name;
     int index = 0;  ///< In the question's list.
-    /// By how much the entropy over the hypotheses goes down on average, nats, with the interval from the finite number
-    /// of simulated observations. Just 0 where all hypotheses look alike from there.
+    /// By how much the entropy over the hypotheses goes down on average at least, nats: a lower bound, as circumstances
+    /// are known from those drawn only. With the bound's interval from the finite number of simulated observations.
+    /// Just 0 where all hypotheses look alike from there.
     double reduction = 0.0, low = 0.0, high = 0.0;
     int visible_pixels = 0;    ///< Of the object, on average over the hypotheses, of the reduced image.
     int different_pixels = 0;  ///< Of the reduced image: those at which hypotheses differ.
@@ -65,7 +66,7 @@ struct NextViewAnswer {
   double entropy = 0.0;  ///< Over the hypotheses now, nats.
   std::vector<Hypothesis> hypotheses;
   std::vector<View> views;  ///< The most telling first.
-  bool any_tells = false;   ///< Some candidate's interval is above 0.
+  bool any_tells = false;   ///< Some candidate's interval is above 0, with the confidence of all together.
   /// The first is better than the second by more than chance explains; true also of a single candidate that tells
   /// something.
   bool best_is_clear = false;

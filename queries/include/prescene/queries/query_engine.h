@@ -52,7 +52,8 @@ struct QueryContext {
   const core::Cancellation* abandoned = nullptr;
   /// From this moment on the probabilities are those of the instances that were finished; all else is still worked out.
   std::optional<core::Cancellation::Clock::time_point> simulate_until;
-  /// Memory that instances and their states may take, bytes: no more are run, and what needs more is refused.
+  /// Memory that instances and their states, or simulated images, may take, bytes: no more are run, and what needs more
+  /// is refused.
   std::size_t most_bytes = std::size_t{16} << 30;
   /// What was observed until now, of TimelineQuery; may be empty, or give null, where nothing was kept.
   std::function<std::shared_ptr<const belief::ObservedTimeline>()> timeline;
