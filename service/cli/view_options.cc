@@ -86,6 +86,10 @@ core::Status not_an_image(const std::string& name) {
                          "' is of another form: use the program of the service's version");
 }
 
+std::size_t pixel_count(int width, int height) {
+  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+}
+
 /// Of any encoding that an answer has, as numbers; `scale` is put on where it is given.
 core::Result<geometry::Image<float>> numbers_of(const Json& image, const std::string& name) {
   constexpr int kMostSide = 16384;
@@ -93,9 +97,10 @@ core::Result<geometry::Image<float>> numbers_of(const Json& image, const std::st
   const std::string encoding = image.value("encoding", "");
   const std::size_t size = encoding == "32FC1" ? 4 : encoding == "16UC1" ? 2 : encoding == "mono8" ? 1 : 0;
   if (size == 0 || width < 1 || height < 1 || width > kMostSide || height > kMostSide) return not_an_image(name);
-  geometry::Image<float> result(width, height);
-  const auto bytes = decoded(image.value("base64", ""), result.size() * size);
+  // Before the image, whose size is the answer's word only.
+  const auto bytes = decoded(image.value("base64", ""), pixel_count(width, height) * size);
   if (!bytes) return not_an_image(name);
+  geometry::Image<float> result(width, height);
   const double scale = image.value("scale", 1.0);
   for (std::size_t i = 0; i < result.size(); ++i) {
     const std::uint8_t* const at = bytes->data() + i * size;
@@ -127,9 +132,9 @@ core::Status write_color(const Json& image, const std::filesystem::path& path) {
   const int width = image.value("width", 0), height = image.value("height", 0);
   if (image.value("encoding", "") != "rgb8" || width < 1 || height < 1 || width > kMostSide || height > kMostSide)
     return not_an_image("color");
-  geometry::ColorImage color(width, height);
-  const auto bytes = decoded(image.value("base64", ""), color.size() * 3);
+  const auto bytes = decoded(image.value("base64", ""), pixel_count(width, height) * 3);
   if (!bytes) return not_an_image("color");
+  geometry::ColorImage color(width, height);
   for (std::size_t i = 0; i < color.size(); ++i)
     color.data()[i] = {(*bytes)[3 * i], (*bytes)[3 * i + 1], (*bytes)[3 * i + 2]};
   return interfaces::write_png(path, interfaces::ColorView(color.view()));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as a question, as it comes over the bus, about what will be or what happened: understood, or refused with a
 // reason; what is understood can be written down and read again.
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -25,6 +27,20 @@ void check_explain(std::string_view text) {
   PRESCENE_CHECK(to_json(*again) == to_json(*question));
 }
 
+/// Numbers up to rounding: reading makes quaternions unit ones and degrees radians, again and again.
+bool is_same(const nlohmann::ordered_json& a, const nlohmann::ordered_json& b) {
+  if (a.is_number() && b.is_number()) {
+    const double x = a.get<double>(), y = b.get<double>();
+    return x == y || std::abs(x - y) <= 1e-9 * std::max(std::abs(x), std::abs(y)) + 1e-15;
+  }
+  if (a.type() != b.type() || a.size() != b.size()) return false;
+  if (a.is_array()) return std::equal(a.begin(), a.end(), b.begin(), is_same);
+  if (!a.is_object()) return a == b;
+  for (const auto& [key, value] : a.items())
+    if (!b.contains(key) || !is_same(value, b.at(key))) return false;
+  return true;
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -38,6 +54,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const auto again = belief::query_from_json(belief::to_json(*query).dump());
   PRESCENE_CHECK_MSG(again.ok(), again.status().message());
-  PRESCENE_CHECK(again->id == query->id && again->what.index() == query->what.index());
+  PRESCENE_CHECK(again->what.index() == query->what.index());
+  PRESCENE_CHECK(is_same(belief::to_json(*again), belief::to_json(*query)));
   return 0;
 }
