@@ -243,7 +243,8 @@ core::Result<belief::AchieveAnswer> achieve(const Prior& prior, const belief::Ac
   const auto on_round = [&](const SearchResult& known) {
     belief::AchieveAnswer partial = answer;
     describe(known, *prepared, query, partial);
-    // May be looked at at any time, as those of the choices.
+    // May be looked at at any time, as those of the choices. Approximate, as is the interval of the answer: both
+    // suppose independent draws, and the explored points are of a scrambled Sobol net.
     const ShareInterval anywhere =
         confidence_sequence(known.explored_successes, known.explored, 1.0 - query.effort.confidence, {});
     partial.anywhere.low = anywhere.low;

@@ -88,7 +88,8 @@ struct Query {
   std::variant<WhereQuery, PredictQuery, StabilityQuery, ViewQuery, AchieveQuery, RelationsQuery, TimelineQuery,
                NextViewQuery>
       what;
-  /// Answers so far are wanted, too, as soon as there is anything to tell. Does not change the answer.
+  /// Answers so far are wanted, too, as soon as there is anything to tell. Does not change the answer, unless its time
+  /// runs out: the number of instances can differ then.
   bool stream = false;
   friend bool operator==(const Query&, const Query&) = default;
 };
