@@ -253,9 +253,11 @@ void weigh(const StartDistribution& starts, OutcomeEstimate& estimate) {
   }
 }
 
-/// Shares and intervals of what was weighed, and whether all are narrow enough.
-void evaluate(const StartDistribution& starts, std::span<const Variable> variables, double confidence, double tolerance,
-              OutcomeEstimate& estimate) {
+using IntervalRule = ClassEstimate(std::span<const ComponentClasses> components, int which, double confidence);
+
+/// Shares and intervals, by `rule`, of what was weighed, and whether all are narrow enough.
+void evaluate(const StartDistribution& starts, std::span<const Variable> variables, IntervalRule& rule,
+              double confidence, double tolerance, OutcomeEstimate& estimate) {
   std::vector<ComponentClasses> components(starts.components.size());
   for (std::size_t k = 0; k < components.size(); ++k) components[k].weight = starts.components[k].weight;
   const CertificateUse& use = estimate.certificates;
@@ -274,7 +276,7 @@ void evaluate(const StartDistribution& starts, std::span<const Variable> variabl
       components[static_cast<std::size_t>(record.component)].classes.push_back(record.classes[v]);
     VariableEstimate& variable = estimate.variables.emplace_back();
     for (std::size_t c = 0; c < variables[v].classes.size(); ++c) {
-      ClassEstimate& found = variable.classes.emplace_back(class_estimate(components, static_cast<int>(c), confidence));
+      ClassEstimate& found = variable.classes.emplace_back(rule(components, static_cast<int>(c), confidence));
       if (estimate.certain) found.low = found.high = found.probability, found.half_width = 0.0;
       found.half_width += doubt + failed_share;
       found.low = std::max(0.0, found.low - doubt);
@@ -307,7 +309,7 @@ class Looks {
     const double error = (1.0 - options_.confidence) / (look * (look + 1.0));
     std::vector<VariableEstimate> own = std::move(estimate.variables);
     const bool converged = estimate.converged;
-    evaluate(starts_, variables_, 1.0 - error, options_.tolerance, estimate);
+    evaluate(starts_, variables_, look_estimate, 1.0 - error, options_.tolerance, estimate);
     estimate.wall_seconds = wall_seconds;
     options_.on_look(estimate);
     estimate.variables = std::move(own);
@@ -445,7 +447,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
     estimate.variables.clear();
     estimate.converged = false;
     if (!estimate.instances.empty()) {
-      evaluate(starts, variables, options.confidence, options.tolerance, estimate);
+      evaluate(starts, variables, class_estimate, options.confidence, options.tolerance, estimate);
       estimate.history.push_back({static_cast<int>(estimate.instances.size()), estimate.variables});
       looks.tell(estimate, watch.seconds());
     }

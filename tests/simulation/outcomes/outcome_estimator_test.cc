@@ -397,6 +397,41 @@ TEST(ClassEstimate, OneInstanceSaysLittle) {
   EXPECT_LT(one.low, 0.2);
 }
 
+TEST(LookEstimate, IsExactWhereAClassIsRare) {
+  // With confidence 1 - e, none of n draws: p up to 1 - (e / 2)^(1 / n); all of them: the same of the rest.
+  ComponentClasses none;
+  none.classes.assign(64, 1);
+  const double reach = 1.0 - std::pow(0.5 * 0.01, 1.0 / 64.0);
+  EXPECT_NEAR(look_estimate(std::span(&none, 1), 0, 0.99).high, reach, 1e-9);
+  EXPECT_EQ(look_estimate(std::span(&none, 1), 0, 0.99).low, 0.0);
+  EXPECT_NEAR(look_estimate(std::span(&none, 1), 1, 0.99).low, 1.0 - reach, 1e-9);
+  EXPECT_EQ(look_estimate(std::span(&none, 1), 1, 0.99).high, 1.0);
+
+  // With one of n draws, at the upper end p: (1 - p)^n + n p (1 - p)^(n - 1) = e / 2.
+  ComponentClasses once = none;
+  once.classes[20] = 0;
+  const ClassEstimate rare = look_estimate(std::span(&once, 1), 0, 0.99);
+  const double p = rare.high;
+  EXPECT_NEAR(std::pow(1.0 - p, 64) + 64.0 * p * std::pow(1.0 - p, 63), 0.5 * 0.01, 1e-9);
+  const ClassEstimate wald = class_estimate(std::span(&once, 1), 0, 0.99);
+  EXPECT_EQ(rare.probability, wald.probability);
+  EXPECT_LT(wald.high, rare.high);
+  EXPECT_LE(rare.low, wald.low);
+  EXPECT_GE(rare.half_width, wald.half_width);
+}
+
+TEST(LookEstimate, TakesTheNetForBetterWhereThatIsNoChance) {
+  // The nets of ClassEstimate: one as even as can be, and one that scatters more than independent draws.
+  ComponentClasses even, clumped;
+  for (int i = 0; i < 256; ++i) even.classes.push_back(i % 4 == 0 ? 0 : 1);
+  for (int i = 0; i < 256; ++i) clumped.classes.push_back(i < 64 ? 0 : 1);
+  const ClassEstimate narrow = look_estimate(std::span(&even, 1), 0, 0.99);
+  const ClassEstimate wide = look_estimate(std::span(&clumped, 1), 0, 0.99);
+  EXPECT_LT(narrow.half_width, 0.5 * wide.half_width);
+  EXPECT_LE(narrow.low, class_estimate(std::span(&even, 1), 0, 0.99).low);
+  EXPECT_GE(narrow.high, class_estimate(std::span(&even, 1), 0, 0.99).high);
+}
+
 /// Of every `every`-th instance the simulation blows up.
 class FailingSimulator final : public Simulator {
  public:

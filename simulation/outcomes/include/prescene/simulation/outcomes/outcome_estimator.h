@@ -19,10 +19,11 @@
 //   ... estimate.variables[0].classes[0].probability
 //
 // With EstimatorOptions::on_look, what is known is told while the work goes on: after the first 32 instances and at
-// each growth of the net. Whoever looks again and again, and stops when they like what they see, is not deceived: the
-// k-th look has the share 1 / (k (k + 1)) of the tolerated error, so that the intervals of all looks hold together with
-// the wanted confidence, as far as each interval holds alone (Bonferroni's inequality). They are wider than the
-// estimate's.
+// each growth of the net. Whoever looks at a class again and again, and stops when they like what they see, is not
+// deceived: the k-th look has the share 1 / (k (k + 1)) of the tolerated error, so that the intervals of all looks at a
+// class hold together with the wanted confidence (Bonferroni's inequality). This is true of each class by itself, not
+// of all classes together. The intervals (look_estimate) are wider than the estimate's, as errors so small take tails
+// that are exact.
 #pragma once
 
 #include <functional>
@@ -75,7 +76,7 @@ struct EstimatorOptions {
   double audit_share = 0.02;         ///< Of the decided instances that are run to rest all the same, in [0, 1].
   double tolerated_mismatch = 0.01;  ///< Share of the audited with another class beyond which nothing is certified.
   /// Told what is known so far, with the intervals of a look (top of this file); not where nothing is random. From the
-  /// calling thread; may be empty. Does not change results.
+  /// calling thread; may be empty. Does not change results but for the number of instances where the time runs out.
   std::function<void(const OutcomeEstimate& so_far)> on_look = {};
 };
 
@@ -190,5 +191,12 @@ struct ComponentClasses {
 /// where the blocks' variance is not significantly (5 %) below that of independent draws. When the class holds of all
 /// instances or none: Jeffreys' interval.
 ClassEstimate class_estimate(std::span<const ComponentClasses> components, int which, double confidence);
+/// The same share with an interval that holds with any confidence, however near to one: the wider at each end of
+/// class_estimate's and that of Clopper and Pearson [1934]. The latter is exact for independent draws of equal weight.
+/// It is for the number of such draws that the components are worth, 1 / sum of w_k^2 / N_k; components that differ
+/// scatter less than so many draws [Hoeffding 1956]. Where the blocks' variance is below that of independent draws, and
+/// would be by chance no more often than the interval may miss, it is for the number of draws with that variance [Korn
+/// & Graubard 1998], and approximate.
+ClassEstimate look_estimate(std::span<const ComponentClasses> components, int which, double confidence);
 
 }  // namespace prescene::simulation
