@@ -16,6 +16,19 @@ struct Numbered {
   int number = 0;
 };
 
+TEST(FairQueue, WhoWasRefusedKeepsNoTurn) {
+  FairQueue<int> queue({10, 2, 1000});
+  queue.push("a", 1, 1);
+  queue.push("c", 2, 1);
+  EXPECT_EQ(queue.push("b", 3, 1).size(), 1u);
+  EXPECT_EQ(queue.pop()->item, 1);
+  queue.push("d", 4, 1);
+  EXPECT_EQ(queue.pop()->item, 2);
+  queue.push("b", 5, 1);  // comes after d
+  EXPECT_EQ(queue.pop()->item, 4);
+  EXPECT_EQ(queue.pop()->item, 5);
+}
+
 TEST(FairQueue, ClientsTakeTurns) {
   FairQueue<int> queue({10, 100, 1000});
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(queue.push("a", i, 1).empty());

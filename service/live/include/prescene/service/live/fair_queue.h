@@ -61,6 +61,7 @@ class FairQueue {
       refused.push_back(drop_newest(most(own, [](const Waiting& one) { return one.items.size(); }), FairBound::kOfAll));
     while (bytes_ > limits_.bytes_of_all)
       refused.push_back(drop_newest(most(own, [](const Waiting& one) { return one.bytes; }), FairBound::kBytesOfAll));
+    if (!refused.empty()) forget_empty();
     return refused;
   }
 
@@ -71,7 +72,7 @@ class FairQueue {
       const auto turn = turns_.begin() + static_cast<std::ptrdiff_t>(i);
       const auto found = clients_.find(*turn);
       Waiting& waiting = found->second;
-      if (waiting.items.empty()) {  // its items were taken out
+      if (waiting.items.empty()) {  // no memory was left for its first item
         clients_.erase(found);
         turns_.erase(turn);
         continue;
@@ -114,6 +115,7 @@ class FairQueue {
         one = waiting.items.erase(one);
       }
     }
+    forget_empty();
     return before - count_;
   }
 
@@ -140,6 +142,16 @@ class FairQueue {
     bool has_turn = false;
   };
 
+  /// Else clients that are refused while nothing is taken out would add up.
+  void forget_empty() {
+    std::erase_if(turns_, [this](const std::string& client) {
+      const auto found = clients_.find(client);
+      if (!found->second.items.empty()) return false;
+      clients_.erase(found);
+      return true;
+    });
+  }
+
   Refused drop_newest(Waiting& of, FairBound bound) {
     Refused refused{std::move(of.items.back().item), bound};
     --count_;
@@ -160,7 +172,7 @@ class FairQueue {
 
   FairLimits limits_;
   std::map<std::string, Waiting> clients_;
-  std::deque<std::string> turns_;  // clients that have items, or had them taken out
+  std::deque<std::string> turns_;  // clients that have items
   std::size_t count_ = 0, bytes_ = 0;
 };
 
