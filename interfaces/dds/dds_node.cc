@@ -421,6 +421,13 @@ int DdsNode::matched_readers(DdsPublisher publisher) const {
                                                                                : 0;
 }
 
+std::uint64_t DdsNode::readers_so_far(DdsPublisher publisher) const {
+  const std::lock_guard lock(impl_->mutex);
+  dds_publication_matched_status_t status;
+  const dds_entity_t writer = impl_->publications[static_cast<std::size_t>(publisher.index)].writer;
+  return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK ? status.total_count : 0;
+}
+
 int DdsNode::matched_writers(const std::string& topic) const {
   const std::lock_guard lock(impl_->mutex);
   for (const Impl::Subscription& subscription : impl_->subscriptions) {

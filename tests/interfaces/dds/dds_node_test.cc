@@ -293,6 +293,17 @@ class TwoNodes : public testing::Test {
   core::Result<std::unique_ptr<DdsNode>> reader_ = DdsNode::create(small_messages(), {});
 };
 
+TEST_F(TwoNodes, ReadersThatLeftCountAmongThoseSoFar) {
+  const DdsPublisher publisher = text_publisher("/counted");
+  EXPECT_EQ((*writer_)->readers_so_far(publisher), 0U);
+  listen("/counted", [](ReceivedMessage&&) {});
+  meet(publisher);
+  EXPECT_EQ((*writer_)->readers_so_far(publisher), 1U);
+  reader_->reset();
+  while ((*writer_)->matched_readers(publisher) > 0) std::this_thread::yield();
+  EXPECT_EQ((*writer_)->readers_so_far(publisher), 1U);
+}
+
 TEST_F(TwoNodes, AnExceptionEndsTheWorkOnItsSampleOnly) {
   const DdsPublisher publisher = text_publisher("/thrown");
   listen("/thrown", [&](ReceivedMessage&& message) {

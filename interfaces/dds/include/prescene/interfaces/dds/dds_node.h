@@ -168,6 +168,8 @@ class DdsNode {
 
   /// How many readers on the bus match a publisher now.
   int matched_readers(DdsPublisher publisher) const;
+  /// How many readers have matched a publisher since it was advertised, including those that left: it never decreases.
+  std::uint64_t readers_so_far(DdsPublisher publisher) const;
   /// How many writers match a subscription now, 0 for an unknown topic.
   int matched_writers(const std::string& topic) const;
   /// How many writers on the bus that are not this node's offer a topic now, whatever their type; no subscription is
