@@ -101,8 +101,13 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   record(kBeliefTopic, json);
   publish_events(events.note(summary, *belief->scene, step.news));
   if (collisions)
-    for (const auto& message : planning.changes(summary, *belief->scene, world, node->matched_readers(*collisions)))
-      check_sent(node->publish(*collisions, message));
+    planning.tell(summary, *belief->scene, world,
+                  {node->matched_readers(*collisions), node->readers_so_far(*collisions)},
+                  [&](const interfaces::RosCollisionObject& message) {
+                    const core::Status sent = node->publish(*collisions, message);
+                    check_sent(sent);
+                    return sent.ok();
+                  });
   if (overlay && overlay->wants(step.observation))
     overlay->show({belief, summary, step.observation, step.camera_frame});
 }

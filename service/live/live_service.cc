@@ -89,6 +89,7 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   tracker->prepare();
   auto impl = std::make_unique<Impl>(std::move(scene), settings, std::move(tracker), std::move(recording), log);
   impl->backends = &backends;
+  if (settings.planning_scene) impl->planning.prepare(*impl->scene);
   PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, log));
   Impl* raw = impl.get();
   const auto on_answer = [raw](const std::string& answer) {  // on several threads
