@@ -61,7 +61,7 @@ std::vector<BeliefEvent> BeliefEvents::note(const BeliefSummary& summary, const 
   };
   if (news.clock_went_back) add("clock_set_back").reason = "the belief began anew";
   if (news.restarted) add("restarted").reason = "a control asked for it";
-  if (news.clock_went_back || news.restarted || summary.step <= step_) {
+  if (news.clock_went_back || news.restarted || summary.step < step_) {
     objects_.clear();
     supports_.clear();
   }

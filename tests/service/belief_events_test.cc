@@ -104,6 +104,19 @@ TEST(BeliefEvents, TellAllThatTheBeliefsSay) {
   }
 }
 
+TEST(BeliefEvents, ObjectsAreToldOnceWhileTheFirstFramesAreRefused) {
+  const belief::Scene scene = tests::floor_scene(tests::primitive_model("box", geometry::BoxShape{{0.1, 0.1, 0.1}}));
+  BeliefEvents events;
+  BeliefSummary summary{0, 1'000, {object_of("box", TrackState::kTracked, MotionMode::kResting)}};
+  using Words = std::vector<std::string>;
+  EXPECT_EQ(words(events.note(summary, scene, {})), Words{"found"});
+  EXPECT_EQ(words(events.note(summary, scene, {})), Words{}) << "the second frame was refused, too";
+  summary.step = 1;
+  EXPECT_EQ(words(events.note(summary, scene, {})), Words{});
+  summary.step = 0;
+  EXPECT_EQ(words(events.note(summary, scene, {})), Words{"found"}) << "a belief that began anew";
+}
+
 TEST(BeliefEvents, AMotionIsToldOnceItLasts) {
   const belief::Scene scene = tests::floor_scene(tests::primitive_model("box", geometry::BoxShape{{0.1, 0.1, 0.1}}));
   BeliefEvents events;
