@@ -155,14 +155,15 @@ std::vector<BeliefEvent> BeliefEvents::note(const BeliefSummary& summary, const 
   return events;
 }
 
-std::optional<BeliefEvent> BeliefEvents::note_frames(bool come, core::TimeNs stamp_ns, const std::string& why_not) {
+std::optional<BeliefEvent> BeliefEvents::note_frames(bool come, core::TimeNs stamp_ns,
+                                                     const std::function<std::string()>& why_not) {
   const std::optional<bool> before = frames_come_;
   if (before || come) frames_come_ = come;
   if (!before || *before == come) return std::nullopt;
   BeliefEvent event{stamp_ns, step_, come ? "frames_used" : "frames_silent"};
   event.from = come ? "silent" : "used";
   event.to = come ? "used" : "silent";
-  if (!come) event.reason = why_not;
+  if (!come) event.reason = why_not();
   return event;
 }
 

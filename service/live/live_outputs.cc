@@ -209,12 +209,18 @@ void LiveService::Impl::report_changes(const ServiceHealth& health) {
   was_degraded = !health.degraded.empty();
 }
 
+void LiveService::Impl::note_frames() {
+  ServiceHealth health_of_frames;
+  health_of_frames.seconds_since_frame = seconds_since_frame();
+  const auto event = events.note_frames(is_tracking(health_of_frames), tracker->belief()->stamp_ns,
+                                        [this] { return health_text(health()); });
+  if (event) publish_events({*event});
+}
+
 void LiveService::Impl::publish_diagnostics() {
   const ServiceHealth now = health();
   const core::TimeNs stamp_ns = tracker->uses_simulated_time() ? tracker->simulated_now_ns() : core::wall_now_ns();
   report_changes(now);
-  if (const auto event = events.note_frames(is_tracking(now), tracker->belief()->stamp_ns, health_text(now)))
-    publish_events({*event});
   check_sent(node->publish(
       diagnostics, interfaces::RosDiagnosticArray{{interfaces::to_ros_time(stamp_ns), ""},
                                                   {to_diagnostic(now, last_reported, settings.dds.node_name)}}));

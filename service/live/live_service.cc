@@ -364,6 +364,7 @@ bool LiveService::Impl::look_after_frames() {
   }
   look_after_learned();
   look_after_saves();
+  note_frames();
   if (diagnostics_limit.due()) publish_diagnostics();
   return stepped;
 }

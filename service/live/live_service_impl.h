@@ -109,6 +109,8 @@ struct LiveService::Impl {
   void publish_events(const std::vector<BeliefEvent>& happened);
   /// Of the pose of an object that was found.
   void advertise_new(const std::string& object);
+  /// Publishes whether frames come, where that changed.
+  void note_frames();
   void publish_diagnostics();
   core::TimeNs now();
   std::string domain_text() const { return "DDS domain " + std::to_string(settings.dds.domain); }

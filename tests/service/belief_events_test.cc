@@ -160,15 +160,20 @@ TEST(BeliefEvents, SupportsCamerasAndFramesAreToldOnce) {
   ++summary.step;
   EXPECT_EQ(words(events.note(summary, scene, {})), Words{"camera_used"});
 
-  EXPECT_FALSE(events.note_frames(false, 1, "none came yet"));
-  EXPECT_FALSE(events.note_frames(true, 2, ""));
-  EXPECT_FALSE(events.note_frames(true, 3, ""));
-  const auto silent = events.note_frames(false, 4, "no frame is used any more");
+  const auto because = [](const std::string& text) { return [text] { return text; }; };
+  const auto unneeded = [] {
+    ADD_FAILURE() << "no event needs a reason";
+    return std::string();
+  };
+  EXPECT_FALSE(events.note_frames(false, 1, unneeded));
+  EXPECT_FALSE(events.note_frames(true, 2, unneeded));
+  EXPECT_FALSE(events.note_frames(true, 3, unneeded));
+  const auto silent = events.note_frames(false, 4, because("no frame is used any more"));
   ASSERT_TRUE(silent);
   EXPECT_EQ(silent->event, "frames_silent");
   EXPECT_EQ(silent->reason, "no frame is used any more");
-  EXPECT_FALSE(events.note_frames(false, 5, "the same"));
-  EXPECT_TRUE(events.note_frames(true, 6, ""));
+  EXPECT_FALSE(events.note_frames(false, 5, unneeded));
+  EXPECT_TRUE(events.note_frames(true, 6, unneeded));
 }
 
 TEST(BeliefEvents, JsonHasTheKeysOfTheSchema) {

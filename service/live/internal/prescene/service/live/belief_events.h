@@ -6,6 +6,7 @@
 //   for (const BeliefEvent& event : events.note(summary, *belief->scene, news)) ... to_json(event)
 #pragma once
 
+#include <functional>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -39,8 +40,9 @@ class BeliefEvents {
   /// What a step changed, in an order that does not depend on anything else. The first belief of a session, and the
   /// first after the belief began anew, changes everything.
   std::vector<BeliefEvent> note(const BeliefSummary& summary, const belief::Scene& scene, const StepNews& news);
-  /// Of the frames of all cameras: whether they come. The first of them are no event.
-  std::optional<BeliefEvent> note_frames(bool come, core::TimeNs stamp_ns, const std::string& why_not);
+  /// Of the frames of all cameras: whether they come. The first of them are no event. `why_not` is called
+  /// where an event needs it only.
+  std::optional<BeliefEvent> note_frames(bool come, core::TimeNs stamp_ns, const std::function<std::string()>& why_not);
 
  private:
   struct Known {
