@@ -195,10 +195,12 @@ core::Status LiveService::Impl::join_bus() {
   if (settings.overlay_rate > 0.0) {
     auto made = OverlayPublisher::create(*node, *backends, settings.overlay_rate,
                                          [this](const core::Status& why) { check_sent(why); });
-    if (made)
+    if (made) {
       overlay = *std::move(made);
-    else
+      for (const auto& [topic, why] : overlay->refused()) warn_not_published(topic, why, "give --overlay-rate 0, or");
+    } else {
       warn_not_published(kOverlayTopic, made.status(), "give --overlay-rate 0, or");
+    }
   }
   for (const belief::SceneObject& object : scene->objects) {
     PRESCENE_TRY(poses[object.name], node->advertise(pose_topic(object.name), kPoseType, TopicQos::kState));

@@ -23,12 +23,20 @@ constexpr int kOverlayQuality = 80;
 core::Result<std::unique_ptr<OverlayPublisher>> OverlayPublisher::create(
     interfaces::DdsNode& node, Backends& backends, double rate, std::function<void(const core::Status&)> on_failure) {
   std::unique_ptr<OverlayPublisher> made(new OverlayPublisher(node, backends, rate, std::move(on_failure)));
-  PRESCENE_TRY(made->image_, node.advertise(kOverlayTopic, "sensor_msgs/msg/Image", TopicQos::kImages));
-  PRESCENE_TRY(made->compressed_,
-               node.advertise(kOverlayCompressedTopic, "sensor_msgs/msg/CompressedImage", TopicQos::kImages));
-  PRESCENE_TRY(made->info_, node.advertise(kOverlayInfoTopic, "sensor_msgs/msg/CameraInfo", TopicQos::kState));
+  made->image_ = made->advertised(kOverlayTopic, "sensor_msgs/msg/Image", TopicQos::kImages);
+  made->compressed_ = made->advertised(kOverlayCompressedTopic, "sensor_msgs/msg/CompressedImage", TopicQos::kImages);
+  if (!made->image_ && !made->compressed_) return made->refused_.front().second;
+  made->info_ = made->advertised(kOverlayInfoTopic, "sensor_msgs/msg/CameraInfo", TopicQos::kState);
   made->thread_ = std::thread([raw = made.get()] { raw->work(); });
   return made;
+}
+
+std::optional<interfaces::DdsPublisher> OverlayPublisher::advertised(const char* topic, const char* type,
+                                                                     TopicQos qos) {
+  auto publisher = node_.advertise(topic, type, qos);
+  if (publisher) return *publisher;
+  refused_.emplace_back(topic, publisher.status());
+  return std::nullopt;
 }
 
 OverlayPublisher::~OverlayPublisher() {
@@ -43,7 +51,7 @@ OverlayPublisher::~OverlayPublisher() {
 bool OverlayPublisher::wants(const belief::Observation& observation) {
   if (!pictured_.has(observation)) return false;
   if (since_ && since_->seconds() < interval_s_) return false;
-  return node_.matched_readers(image_) > 0 || node_.matched_readers(compressed_) > 0;
+  return is_read(image_) || is_read(compressed_);
 }
 
 void OverlayPublisher::show(OverlayFrame frame) {
@@ -80,12 +88,12 @@ core::Status OverlayPublisher::publish(const OverlayFrame& frame) {
   const interfaces::RosHeader header{interfaces::to_ros_time(frame.observation.stamp_ns), frame.camera_frame};
   drawn_.fetch_add(1, std::memory_order_relaxed);
   // First, so that it is there when the picture comes.
-  PRESCENE_RETURN_IF_ERROR(
-      node_.publish(info_, interfaces::to_ros_camera_info(frame.observation.frame.camera, header)));
-  if (node_.matched_readers(image_) > 0)
-    PRESCENE_RETURN_IF_ERROR(node_.publish(image_, interfaces::to_ros_image(picture, header)));
-  if (node_.matched_readers(compressed_) == 0) return core::ok_status();
-  return node_.publish(compressed_,
+  if (info_)
+    PRESCENE_RETURN_IF_ERROR(
+        node_.publish(*info_, interfaces::to_ros_camera_info(frame.observation.frame.camera, header)));
+  if (is_read(image_)) PRESCENE_RETURN_IF_ERROR(node_.publish(*image_, interfaces::to_ros_image(picture, header)));
+  if (!is_read(compressed_)) return core::ok_status();
+  return node_.publish(*compressed_,
                        interfaces::RosCompressedImage{header, "rgb8; jpeg compressed bgr8",
                                                       interfaces::encode_jpeg(picture.view(), kOverlayQuality)});
 }
