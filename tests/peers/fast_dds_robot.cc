@@ -5,7 +5,7 @@
 //
 // It prints what it hears, a line each: "belief STAMP_NS TRUE_X TRUE_Y TRUE_Z JSON", "frame STAMP_NS TRUE_X TRUE_Y
 // TRUE_Z X Y Z" of the frame prescene/box on /tf, and "answer JSON" to its question. It ends with 0 when it has heard
-// enough of each, and with 1 after a minute.
+// enough of each, and with 1 after two minutes.
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -324,7 +324,7 @@ int run(int domain) {
   CameraInfo_ info = camera_info();
   Image_ depth, color;
   bool asked = false;
-  const auto end = steady_clock::now() + std::chrono::minutes(1);
+  const auto end = steady_clock::now() + std::chrono::minutes(2);
   auto next_frame = steady_clock::now();
   std::unique_lock lock(heard.mutex);
   while (!heard.is_enough()) {
