@@ -41,7 +41,8 @@ namespace planning_scene_h {
 extern const BeliefSummary summary;
 extern const std::shared_ptr<const belief::Belief> belief;
 extern const int readers;
-void publish(const interfaces::RosCollisionObject& message);
+extern const std::uint64_t readers_so_far;
+extern const PlanningScene::Send send;
 }  // namespace planning_scene_h
 
 }  // namespace prescene::service::given_service_live

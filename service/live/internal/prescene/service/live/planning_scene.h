@@ -3,7 +3,7 @@
 // to be added, moved and removed so that a planning scene becomes as the belief is.
 //
 //   PlanningScene planning({.supports = true});
-//   planning.prepare(scene);
+//   planning.prepare(*belief->scene);
 //   planning.tell(summary, *belief->scene, "world", {readers, readers_so_far}, send);
 #pragma once
 
