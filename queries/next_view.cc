@@ -165,7 +165,7 @@ struct Imagining {
   std::vector<Imagined> states;
 
   void add(std::optional<Pose> X_WO, double probability) {
-    hypotheses.push_back({X_WO, probability});
+    hypotheses.push_back({std::move(X_WO), probability});
     probabilities.push_back(probability);
   }
 };

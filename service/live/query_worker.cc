@@ -132,7 +132,7 @@ QueryCounts QueryWorker::counts() const {
   return counts_;
 }
 
-void QueryWorker::ask(std::string question_json, std::string client) {
+void QueryWorker::ask(std::string question_json, const std::string& client) {
   try {
     take(std::move(question_json), client);
   } catch (const std::exception&) {

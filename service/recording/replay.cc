@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
+#include "prescene/interfaces/bags/bag_reader.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/recording/read_ahead.h"
@@ -35,12 +37,22 @@ core::Result<bool> has_step_records(const std::filesystem::path& path, bool salv
 core::Result<bool> follows_step_records(const std::filesystem::path& path, const RecordingReader& reader,
                                         const RecordingReadOptions& options) {
   // Only a file of ours has them; and a belief that begins later goes its own way.
-  if (std::filesystem::is_directory(path) || path.extension() == ".db3" || options.from > 0.0) return false;
-  PRESCENE_TRY(bool has_steps, has_step_records(path, options.salvage));
+  if (options.from > 0.0) return false;
+  std::vector<std::filesystem::path> files = {path};
+  std::error_code none;
+  if (std::filesystem::is_directory(path, none)) {
+    if (!interfaces::is_bag(path)) return false;
+    PRESCENE_TRY(const auto bag, interfaces::BagReader::open(path, {.salvage = true, .check_data = false}));
+    files = bag->files();
+  }
   // The first file may be of a time when nothing was tracked yet.
-  for (const std::filesystem::path& later : reader.later_files()) {
+  const std::vector<std::filesystem::path> later = reader.later_files();
+  files.insert(files.end(), later.begin(), later.end());
+  bool has_steps = false;
+  for (const std::filesystem::path& file : files) {
     if (has_steps) break;
-    PRESCENE_TRY(has_steps, has_step_records(later, options.salvage));
+    if (file.extension() == ".db3") continue;
+    PRESCENE_TRY(has_steps, has_step_records(file, options.salvage));
   }
   return has_steps;
 }

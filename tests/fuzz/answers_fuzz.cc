@@ -21,7 +21,7 @@ std::shared_ptr<const belief::Scene> scene() {
   static const auto kScene = fuzz::scene_from(
       "name: two\nmodels:\n  box: {box: [0.1, 0.1, 0.1], mass: 0.4}\nsupports:\n  floor: {ground: {size: 4}}\n"
       "objects:\n  a: {model: box, pose: {position: [0, 0, 0.05]}}\n"
-      "  b: {model: box, pose: {position: [1, 0, 0.05]}}\noutcomes:\n  - {name: falls, object: a, below: 0.01}\n");
+      "  b: {model: box, pose: {position: [1, 0, 0.05]}}\noutcomes:\n  falls: {object: a, below: 0.01}\n");
   return kScene;
 }
 

@@ -107,7 +107,7 @@ class QueryWorker {
   /// answered from what was simulated until now. Such a request is answered itself only if it has an "id" of its own:
   /// {"id", "cancelled": ID}, or an error where no question with that id waits. One that finds no room counts as a
   /// refused question. `client` says who asks: clients take turns. No exception leaves it.
-  void ask(std::string question_json, std::string client = {});
+  void ask(std::string question_json, const std::string& client = {});
 
   QueryCounts counts() const;
 
