@@ -46,7 +46,7 @@ core::Result<bool> follows_step_records(const std::filesystem::path& path, const
     files = bag->files();
   }
   // The first file may be of a time when nothing was tracked yet.
-  const std::vector<std::filesystem::path> later = reader.later_files();
+  const std::vector<std::filesystem::path>& later = reader.later_files();
   files.insert(files.end(), later.begin(), later.end());
   bool has_steps = false;
   for (const std::filesystem::path& file : files) {
