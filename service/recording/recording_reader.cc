@@ -47,6 +47,12 @@ core::Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const std::
   return reader;
 }
 
+std::vector<std::filesystem::path> RecordingReader::files() const {
+  std::vector<std::filesystem::path> files = reader_->files();
+  files.insert(files.end(), parts_.begin(), parts_.end());
+  return files;
+}
+
 core::Status RecordingReader::open_file(const std::filesystem::path& path) {
   const bool is_first = reader_ == nullptr;
   PRESCENE_TRY(reader_, interfaces::BagReader::open(path, {options_.salvage, options_.check_data}));

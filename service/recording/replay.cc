@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <utility>
-#include <vector>
 
-#include "prescene/interfaces/bags/bag_reader.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/recording/read_ahead.h"
@@ -34,22 +32,12 @@ core::Result<bool> has_step_records(const std::filesystem::path& path, bool salv
 }
 
 /// Whether there are step records that a replay follows.
-core::Result<bool> follows_step_records(const std::filesystem::path& path, const RecordingReader& reader,
-                                        const RecordingReadOptions& options) {
+core::Result<bool> follows_step_records(const RecordingReader& reader, const RecordingReadOptions& options) {
   // Only a file of ours has them; and a belief that begins later goes its own way.
   if (options.from > 0.0) return false;
-  std::vector<std::filesystem::path> files = {path};
-  std::error_code none;
-  if (std::filesystem::is_directory(path, none)) {
-    if (!interfaces::is_bag(path)) return false;
-    PRESCENE_TRY(const auto bag, interfaces::BagReader::open(path, {.salvage = true, .check_data = false}));
-    files = bag->files();
-  }
-  // The first file may be of a time when nothing was tracked yet.
-  const std::vector<std::filesystem::path>& later = reader.later_files();
-  files.insert(files.end(), later.begin(), later.end());
   bool has_steps = false;
-  for (const std::filesystem::path& file : files) {
+  // The first file may be of a time when nothing was tracked yet.
+  for (const std::filesystem::path& file : reader.files()) {
     if (has_steps) break;
     if (file.extension() == ".db3") continue;
     PRESCENE_TRY(has_steps, has_step_records(file, options.salvage));
@@ -165,7 +153,7 @@ core::Result<ReplaySummary> replay_recording(const std::filesystem::path& path, 
                                              const core::ProgressSink& progress, const StepSink& on_step,
                                              const JsonSink& on_json) {
   PRESCENE_TRY(const auto reader, RecordingReader::open(path, options));
-  PRESCENE_TRY(const bool follow, follows_step_records(path, *reader, options));
+  PRESCENE_TRY(const bool follow, follows_step_records(*reader, options));
   const double total = static_cast<double>(reader->message_count().value_or(0));
   Replay replay(tracker, on_step, follow);
   ReadAhead ahead(*reader, [&tracker](const auto& message) { return tracker.decode(message); });

@@ -202,8 +202,8 @@ class RecordingReader {
   /// Of the loss, what is in files of the recording that are not there or can't be read. Not what its last file was cut
   /// by, nor what was not recorded.
   const std::string& missing_text() const { return missing_; }
-  /// The files after the one that is read, with all_parts.
-  const std::vector<std::filesystem::path>& later_files() const { return parts_; }
+  /// The one that is read, or those of a bag, and with all_parts those after it.
+  std::vector<std::filesystem::path> files() const;
   /// Nothing where it is not known: of several files before the last is reached.
   std::optional<std::uint64_t> message_count() const {
     return parts_.empty() ? reader_->message_count() : std::nullopt;
