@@ -18,9 +18,6 @@ using belief::Particle;
 
 namespace {
 
-constexpr double kSupportAround = 2.5;   // radii of the object; so far around it its support's height is measured
-constexpr double kMostInSupport = 0.25;  // share of a pose that may be inside of a support; as of finds
-
 /// How far above where the scene has them the frame shows the supports about an object, m. 0 where the pose is clear
 /// of them as the scene has them: it does not matter there.
 double support_offset(const FilterFrame& frame, const SearchTarget& target, const Pose& X_WO, double tolerance) {

@@ -16,10 +16,8 @@ constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10
 constexpr double kFirstGate = 0.03;          // m; residuals beyond about half of it lose their weight ...
 constexpr double kSharedShift = 0.003;       // m; an outline serves for poses so near to where it was taken ...
 constexpr double kSharedTurn = 0.03;         // rad
-constexpr double kSupportAround = 2.5;       // radii of the object; so far around it its support's height is measured
 constexpr double kContactHeight = 0.001;     // m, error of a support's height where no frame can tell
-constexpr double kFullOverlap = 0.25;        // share of a pose's overlap with a support from which ...
-constexpr double kLogInSupport = -12.0;      // nats; ... it costs this; less in proportion
+constexpr double kLogInSupport = -12.0;      // nats; kMostInSupport and more costs this; less in proportion
 
 /// What the outline is worth: 0 where nothing ends at it, 1 where enough does.
 double outline_worth(double outline, const WeightOptions& options) {
@@ -197,12 +195,15 @@ double ParticleUpdate::outline(const Pose& X_WO) const {
   return outline_at(terms_, target_, X_CW_ * X_WO, options_, tools_);
 }
 
+double ParticleUpdate::log_inside(const SupportSurfaces* solids, const Pose& X_WO) const {
+  if (solids == nullptr || solids->empty()) return 0.0;
+  const double overlap = solids->overlap(*target_.mesh, X_WO, options_.support_tolerance);
+  return kLogInSupport * std::min(1.0, overlap / kMostInSupport);
+}
+
 double ParticleUpdate::log_overlap(const belief::Particle& particle) const {
   const bool is_held = particle.mode == belief::MotionMode::kHeld;
-  const SupportSurfaces* solids = is_held || context_.solids == nullptr ? context_.supports : context_.solids;
-  if (solids == nullptr || solids->empty()) return 0.0;
-  const double overlap = solids->overlap(*target_.mesh, particle.X_WO, options_.support_tolerance);
-  return kLogInSupport * std::min(1.0, overlap / kFullOverlap);
+  return log_inside(is_held || context_.solids == nullptr ? context_.supports : context_.solids, particle.X_WO);
 }
 
 Pose clear_of_support(const Pose& X_WO, double support_offset, const Vector3d& up_W) {
@@ -210,10 +211,7 @@ Pose clear_of_support(const Pose& X_WO, double support_offset, const Vector3d& u
 }
 
 double ParticleUpdate::log_in_support(const Pose& X_WO) const {
-  if (context_.supports == nullptr || context_.supports->empty()) return 0.0;
-  const double overlap = context_.supports->overlap(
-      *target_.mesh, clear_of_support(X_WO, context_.support_offset, context_.up_W), options_.support_tolerance);
-  return kLogInSupport * std::min(1.0, overlap / kFullOverlap);
+  return log_inside(context_.supports, clear_of_support(X_WO, context_.support_offset, context_.up_W));
 }
 
 }  // namespace prescene::filter

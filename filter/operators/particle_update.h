@@ -101,6 +101,8 @@ class ParticleUpdate {
   double weight_share() const { return weight_share_; }
 
  private:
+  double log_inside(const SupportSurfaces* solids, const Pose& X_WO) const;
+
   const rendering::FrameTerms& terms_;
   const SearchTarget& target_;
   Pose X_CW_;
