@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "particle_update.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "prescene/filter/proposals/facets.h"
 #include "prescene/geometry/dense_solvers.h"
@@ -14,9 +17,14 @@ using belief::Particle;
 
 constexpr double kSmallestVariance = 1e-10;  // keeps covariances invertible: 10 um, 10 urad
 constexpr double kFirstGate = 0.03;          // m; residuals beyond about half of it lose their weight ...
+constexpr double kMostTurnInStep = 0.25;     // rad
+constexpr double kMostShiftInStep = 0.03;    // m
 constexpr double kSharedShift = 0.003;       // m; an outline serves for poses so near to where it was taken ...
 constexpr double kSharedTurn = 0.03;         // rad
 constexpr double kContactHeight = 0.001;     // m, error of a support's height where no frame can tell
+constexpr double kUncertainTurn = 0.03;      // rad; turns that are known better are not questioned, ...
+constexpr double kLeastTold = 0.01;          // of a variance; ... nor those of which the frame says less
+constexpr double kSideways = 2.0;            // standard deviations to either side of a turn in question
 constexpr double kLogInSupport = -12.0;      // nats; kMostInSupport and more costs this; less in proportion
 
 /// What the outline is worth: 0 where nothing ends at it, 1 where enough does.
@@ -118,21 +126,27 @@ Mode ParticleUpdate::climb(const Pose& X_WO_predicted, const Gaussian& predicted
   mode.shift = start;
   std::optional<Outline> own_outline;
   const Outline* outline = outline_near(mode.X_WO, own_outline);
-  Matrix6d information = predicted.information;
-  for (int step = 0; step <= options_.steps; ++step) {
-    const double t = options_.steps > 1 ? std::min(1.0, static_cast<double>(step) / (options_.steps - 1)) : 1.0;
-    const FrameEquations equations = equations_at(mode.X_WO, gate_at(t), outline);
-    information = predicted.information + equations.information;
-    if (step == options_.steps) break;  // the last pass is for the information at the mode
+  FrameEquations equations;
+  /// Newton's step towards the mode; how far it went, and zero where there is none.
+  const auto step_on = [&] {
     const Vector6d gradient = equations.gradient - predicted.information * mode.shift;
-    Vector6d d = geometry::Cholesky6(information).solve(gradient);
-    if (!d.allFinite()) break;
-    d *= std::min(limited(d.head<3>().norm(), 0.25), limited(d.tail<3>().norm(), 0.03));
+    Vector6d d = geometry::Cholesky6(predicted.information + equations.information).solve(gradient);
+    if (!d.allFinite()) return Vector6d(Vector6d::Zero());
+    d *= std::min(limited(d.head<3>().norm(), kMostTurnInStep), limited(d.tail<3>().norm(), kMostShiftInStep));
     mode.X_WO = geometry::box_plus(mode.X_WO, d);
     mode.shift = geometry::box_minus(mode.X_WO, X_WO_predicted);
-    if (d.head<3>().norm() < 1e-4 && d.tail<3>().norm() < 1e-5 && t == 1.0) break;
+    return d;
+  };
+  for (int step = 0; step <= options_.steps; ++step) {
+    const double t = options_.steps > 1 ? std::min(1.0, static_cast<double>(step) / (options_.steps - 1)) : 1.0;
+    equations = equations_at(mode.X_WO, gate_at(t), outline);
+    if (step == options_.steps) break;  // the last pass is for the information at the mode
+    const Vector6d d = step_on();
+    if (d.isZero(0.0) || (is_near(d, 1e-5, 1e-4) && t == 1.0)) break;
   }
-  const geometry::Cholesky6 cholesky(information);
+  const Matrix6d claimed = geometry::Cholesky6(predicted.information + equations.information).inverse();
+  if (keep_confirmed(mode.X_WO, claimed, equations)) step_on();
+  const geometry::Cholesky6 cholesky(predicted.information + equations.information);
   mode.covariance = cholesky.inverse();
   mode.log_determinant = -2.0 * cholesky.factor().diagonal().array().log().sum();
   return mode;
@@ -161,6 +175,33 @@ FrameEquations ParticleUpdate::equations_at(const Pose& X_WO, double gate, const
   equations.gradient.tail<3>() = X_CW_.rotation.conjugate() * g.tail<3>();
   equations.evidence = residuals.evidence;
   return equations;
+}
+
+bool ParticleUpdate::keep_confirmed(const Pose& X_WO, const Matrix6d& covariance, FrameEquations& equations) const {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(covariance.topLeftCorner<3, 3>());
+  std::optional<double> log_here;
+  bool taken = false;
+  for (int i = 0; i < 3; ++i) {
+    const double deviation = std::sqrt(std::max(0.0, turns.eigenvalues()[i]));
+    if (!(deviation > kUncertainTurn)) continue;
+    // The turn by one deviation, with what follows it.
+    const Vector6d sideways = covariance.leftCols<3>() * turns.eigenvectors().col(i) / deviation;
+    const Vector6d slope = equations.information * sideways;
+    const double told = sideways.dot(slope);
+    if (!(told > kLeastTold)) continue;
+    if (!log_here) log_here = evidence(X_WO).log_ratio;
+    const double reach = std::min(kSideways, kMostStartTurn / deviation);
+    double fall = std::numeric_limits<double>::infinity();
+    for (const double side : {-reach, reach})
+      fall = std::min(fall, *log_here - evidence(geometry::box_plus(X_WO, side * sideways)).log_ratio);
+    const double confirmed = information_share_ * fall / (0.5 * reach * reach * told);
+    if (!(confirmed < 1.0)) continue;
+    const double share = (1.0 - std::max(0.0, confirmed)) / told;
+    equations.gradient -= share * sideways.dot(equations.gradient) * slope;
+    equations.information -= share * slope * slope.transpose();
+    taken = true;
+  }
+  return taken;
 }
 
 PoseEquations ParticleUpdate::standing_at(const Pose& X_WO, const FrameEquations& seen) const {

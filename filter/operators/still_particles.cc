@@ -82,6 +82,7 @@ std::optional<FrameLikelihood> update_still(const ParticleUpdate& frame, double 
   const Outline* outline = frame.outline_near(first.X_WO, own_outline);
   FrameEquations equations = frame.equations_at(first.X_WO, kLastGate, outline, true);
   if (shown_share(equations.evidence) < options.hidden_share) return std::nullopt;
+  frame.keep_confirmed(first.X_WO, predicted.covariance, equations);
   FrameLikelihood likelihood;
   likelihood.X_WO = first.X_WO;
   look_at(frame, equations, likelihood);
@@ -91,6 +92,7 @@ std::optional<FrameLikelihood> update_still(const ParticleUpdate& frame, double 
       const double t = options.steps > 1 ? static_cast<double>(step) / (options.steps - 1) : 1.0;
       if (step > 0) likelihood.X_WO = geometry::box_plus(first.X_WO, update.shift);
       equations = frame.equations_at(likelihood.X_WO, gate_at(t), outline);
+      frame.keep_confirmed(likelihood.X_WO, predicted.covariance, equations);
       look_at(frame, equations, likelihood);
       update = likelihood.update(first.X_WO, predicted.covariance);
       update.shift *= std::min(limited(update.shift.head<3>().norm(), kMostStartTurn),
