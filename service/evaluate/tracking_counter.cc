@@ -16,6 +16,7 @@ using geometry::Pose;
 constexpr double kVisibleShare = 0.5;
 constexpr double kHiddenShare = 0.1;
 constexpr double kSurelyRight = 0.99;
+constexpr double kConfident = 0.9;
 constexpr double kChiSquared90 = 6.2513886;  // 3 degrees of freedom
 constexpr double kStillShift = 1e-4;         // m: a truth that moves less between two frames stands still
 constexpr double kStillTurn = 1e-3;          // rad
@@ -66,6 +67,7 @@ TrackingFigures TrackingCounter::figures() const {
       const bool is_tracked = estimate->state == belief::TrackState::kTracked;
       f.believed += is_tracked;
       f.wrong += is_tracked && !right;
+      f.surely_wrong += is_tracked && !right && estimate->confidence >= kConfident;
       const auto bin = std::min<std::size_t>(9, static_cast<std::size_t>(10.0 * std::max(0.0, estimate->confidence)));
       ++f.by_confidence[bin];
       f.right_by_confidence[bin] += right;

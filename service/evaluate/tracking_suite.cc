@@ -112,6 +112,7 @@ ordered_json figures_json(const TrackingFigures& f) {
           {"believed", f.believed},
           {"share_wrong", or_null(share(f.wrong, f.believed))},
           {"wrong", f.wrong},
+          {"surely_wrong", f.surely_wrong},
           {"median_position_error_m", or_null(core::quantile(f.position_errors, 0.5))},
           {"p90_position_error_m", or_null(core::quantile(f.position_errors, 0.9))},
           {"median_turn_error_rad", or_null(core::quantile(f.turn_errors, 0.5))},
@@ -139,7 +140,7 @@ std::vector<std::string> row_of(const std::string& kind, const TrackingFigures& 
           std::to_string(f.frames),
           std::to_string(f.visible),
           percent(share(f.tracked, f.visible)),
-          std::to_string(f.wrong) + " of " + std::to_string(f.believed),
+          std::to_string(f.wrong) + " (" + std::to_string(f.surely_wrong) + ") of " + std::to_string(f.believed),
           scaled(core::quantile(f.position_errors, 0.5), 1e3, 1),
           scaled(core::quantile(f.turn_errors, 0.5), kDegrees, 1),
           percent(share(f.hidden_covered, f.hidden)) + " of " + std::to_string(f.hidden),
@@ -158,6 +159,7 @@ void TrackingFigures::add(const TrackingFigures& more) {
   tracked += more.tracked;
   believed += more.believed;
   wrong += more.wrong;
+  surely_wrong += more.surely_wrong;
   hidden += more.hidden;
   hidden_covered += more.hidden_covered;
   sure += more.sure;
@@ -246,7 +248,7 @@ ordered_json to_json(const TrackingReport& report) {
 
 std::vector<std::vector<std::string>> table_of(const TrackingReport& report) {
   std::vector<std::vector<std::string>> rows = {
-      {"sequences", "frames", "visible", "tracked, %", "wrong of tracked", "median, mm", "median, deg",
+      {"sequences", "frames", "visible", "tracked, %", "wrong (at 0.9) of tracked", "median, mm", "median, deg",
        "hidden in 90 % region, %", "right at 0.99, %", "still p90, mm", "still p90, deg", "CPU ms/frame"}};
   for (const TrackingRow& row : report.rows) rows.push_back(row_of(row.kind, row.figures));
   if (report.simulated.sequences > 0) rows.push_back(row_of("all simulated", report.simulated));

@@ -90,6 +90,7 @@ TEST(TrackingCounter, CountsRightAndWrongVisibleAndHidden) {
   EXPECT_EQ(f.tracked, 3);
   EXPECT_EQ(f.believed, 4);
   EXPECT_EQ(f.wrong, 3);
+  EXPECT_EQ(f.surely_wrong, 2);
   EXPECT_EQ(f.hidden, 2);
   EXPECT_EQ(f.hidden_covered, 1);
   EXPECT_EQ(f.sure, 2);
