@@ -299,6 +299,7 @@ core::Result<Query> query_from_json(std::string_view text) {
     if (const auto explain = object.find("explain"))
       explain->fail(
           "this is asked of frames that were seen: ask a running 'serve', or 'prescene explain' of a recording");
+    if (const auto why = object.find("why")) why->fail("this is asked of frames that were seen: ask a running 'serve'");
     if (const auto what = object.one_of(kTasks)) {
       JsonObject fields(what->second);
       if (what->first == "where") {

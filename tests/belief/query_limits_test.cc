@@ -10,6 +10,7 @@
 
 #include "prescene/belief/explain_question.h"
 #include "prescene/belief/json.h"
+#include "prescene/belief/why_question.h"
 #include "prescene/core/utf8.h"
 
 namespace prescene::belief {
@@ -146,6 +147,51 @@ TEST(ExplainQuestion, NamesWhatIsWrongInIt) {
   EXPECT_THAT(refusal(R"({"wanted": ""})"), HasSubstr("the name is empty"));
   EXPECT_EQ(refusal(R"({"wanted": {"object": "a", "upright": {"within_deg": 5}}})"), "");
   EXPECT_THAT(query_from_json(R"({"explain": {}})").status().message(), HasSubstr("ask a running 'serve'"));
+}
+
+TEST(WhyQuestion, IsReadAsItIsWritten) {
+  WhyQuestion question;
+  question.id = "9";
+  question.object = "mug";
+  const auto again = [](const WhyQuestion& asked) { return why_question_from_json(json_text(to_json(asked))); };
+  EXPECT_EQ(*again(question), question);
+  question.against = WhyAgainst::kPose;
+  question.X_WO = Pose{Quaterniond(Eigen::AngleAxisd(0.3, Vector3d(1.0, 2.0, 3.0).normalized())), {0.1, 0.2, 0.3}};
+  question.last = 1.5;
+  question.images = 0;
+  question.max_seconds = 2.0;
+  question.stream = true;
+  EXPECT_EQ(*again(question), question);
+  question.last.reset();
+  question.from = 2.25;
+  question.to = 4.5;
+  for (const WhyAgainst against : {WhyAgainst::kAbsence, WhyAgainst::kAlternative}) {
+    question.against = against;
+    question.X_WO.reset();
+    EXPECT_EQ(*again(question), question);
+  }
+  EXPECT_TRUE(asks_why(json_text(to_json(question))));
+  EXPECT_FALSE(asks_why(R"({"where": {"object": "why"}})"));
+  EXPECT_FALSE(asks_why(R"({"why")"));
+}
+
+TEST(WhyQuestion, NamesWhatIsWrongInIt) {
+  const auto refusal = [](const std::string& asked) {
+    const auto question = why_question_from_json(R"({"id": "1", "why": )" + asked + "}");
+    return question ? "" : question.status().message();
+  };
+  EXPECT_THAT(refusal("{}"), HasSubstr("object"));
+  EXPECT_THAT(refusal(R"({"object": ""})"), HasSubstr("why.object"));
+  EXPECT_THAT(refusal(R"({"objct": "a"})"), HasSubstr("object"));
+  EXPECT_THAT(refusal(R"({"object": "a", "against": "nothing"})"), HasSubstr("give \"absence\""));
+  EXPECT_THAT(refusal(R"({"object": "a", "against": 3})"), HasSubstr("why.against"));
+  EXPECT_THAT(refusal(R"({"object": "a", "against": {}})"), HasSubstr("position, rotation"));
+  EXPECT_THAT(refusal(R"({"object": "a", "images": 17})"), HasSubstr("why.images"));
+  EXPECT_THAT(refusal(R"({"object": "a", "from": 1})"), HasSubstr("'from' and 'to' go together"));
+  EXPECT_THAT(refusal(R"({"object": "a", "from": 1, "to": 2, "last": 1})"), HasSubstr("two windows"));
+  EXPECT_THAT(refusal(R"({"object": "a", "from": 2, "to": 1})"), HasSubstr("'from' is not before 'to'"));
+  EXPECT_EQ(refusal(R"({"object": "a", "against": {"position": [0, 0, 1]}})"), "");
+  EXPECT_THAT(query_from_json(R"({"why": {"object": "a"}})").status().message(), HasSubstr("ask a running 'serve'"));
 }
 
 TEST(QueryFromJson, AMistakeInAQuestionAboutViewsIsNamedWithItsPlace) {

@@ -10,6 +10,7 @@
 
 #include "prescene/belief/explain_question.h"
 #include "prescene/belief/json.h"
+#include "prescene/belief/why_question.h"
 #include "prescene/core/check.h"
 
 namespace {
@@ -23,6 +24,19 @@ void check_explain(std::string_view text) {
   }
   PRESCENE_CHECK(asks_to_explain(text));
   const auto again = explain_question_from_json(to_json(*question).dump());
+  PRESCENE_CHECK_MSG(again.ok(), again.status().message());
+  PRESCENE_CHECK(to_json(*again) == to_json(*question));
+}
+
+void check_why(std::string_view text) {
+  using namespace prescene::belief;
+  const auto question = why_question_from_json(text);
+  if (!question) {
+    PRESCENE_CHECK(!question.status().message().empty());
+    return;
+  }
+  PRESCENE_CHECK(asks_why(text));
+  const auto again = why_question_from_json(to_json(*question).dump());
   PRESCENE_CHECK_MSG(again.ok(), again.status().message());
   PRESCENE_CHECK(to_json(*again) == to_json(*question));
 }
@@ -47,6 +61,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace prescene;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   check_explain(text);
+  check_why(text);
   const auto query = belief::query_from_json(text);
   if (!query) {
     PRESCENE_CHECK(!query.status().message().empty());
