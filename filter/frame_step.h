@@ -14,12 +14,6 @@ inline const belief::ObjectModel& model_of(const belief::Belief& belief, std::si
   return belief::model_of(belief, belief.objects[object]);
 }
 
-/// Whether others may take the object's surface for granted.
-inline bool hides_others(const belief::ObjectBelief& object) {
-  return object.existence >= 0.5 &&
-         (object.state == belief::TrackState::kTracked || object.state == belief::TrackState::kDoubtful);
-}
-
 /// Share of an object's pixels that a camera shows from which its turn is looked at.
 inline constexpr double kMostlySeen = 0.5;
 

@@ -19,7 +19,7 @@ constexpr double kHitSpread = 2.5;
 // What is put where another stood stands there to 1 cm, 3 mm in height, 0.03 rad of tilt and 0.5 rad of turn.
 constexpr double kPutShift = 0.01, kPutLift = 0.003, kPutTilt = 0.03, kPutTurn = 0.5;
 // Share of the variance of a depth that is the same in all frames (docs/reference/sensor_model.md): frames average out
-// only the rest, so that of K frames each counts as 1 / (1 + share (K - 1)) of one.
+// only the rest.
 constexpr double kLastingError = 0.25;
 // A path is at a frame's peak up to this squared distance (95 % of chi-squared with six degrees of freedom): what the
 // image says of further ones is looked at.
@@ -61,6 +61,10 @@ void widen(belief::DepthNoiseSettings& noise) {
 }
 
 }  // namespace
+
+double window_tempering(const rendering::Tempering& tempering, double pixels, int step, std::size_t frames) {
+  return rendering::tempering(tempering, pixels, step) / (1.0 + kLastingError * static_cast<double>(frames - 1));
+}
 
 WindowLikelihood::WindowLikelihood(const belief::Belief& start, std::span<const belief::SceneObject> objects,
                                    std::span<const WindowFrame> frames, const ExplainContext& context,
@@ -124,8 +128,7 @@ void WindowLikelihood::set_base(std::vector<ObjectPath> base) {
     for (std::size_t i = 0; i < objects_.size(); ++i)
       if (base_[i][k])
         pixels = std::max(pixels, static_cast<double>(evidence(k, frames_[k].terms, i, *base_[i][k]).measured));
-  share_ = rendering::tempering(frames_.front().terms.tempering.weight, pixels, frames_.front().terms.step) /
-           (1.0 + kLastingError * static_cast<double>(frames_.size() - 1));
+  share_ = window_tempering(frames_.front().terms.tempering.weight, pixels, frames_.front().terms.step, frames_.size());
 }
 
 geometry::DepthImage WindowLikelihood::depth_of(std::size_t frame, std::size_t object, const Pose& X_WO) const {

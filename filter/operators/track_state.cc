@@ -167,6 +167,10 @@ bool is_present(const ObjectBelief& object) {
   return object.state != TrackState::kLost && object.existence >= 0.5 && !object.particles.empty();
 }
 
+bool hides_others(const ObjectBelief& object) {
+  return object.existence >= 0.5 && (object.state == TrackState::kTracked || object.state == TrackState::kDoubtful);
+}
+
 double evidence_scale(double expected_evidence) {
   return std::clamp(expected_evidence / kFullEvidence, kLeastScale, 1.0);
 }

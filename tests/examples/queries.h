@@ -15,6 +15,7 @@
 #include "prescene/queries/query_engine.h"
 #include "prescene/queries/relation_history.h"
 #include "prescene/queries/relations.h"
+#include "prescene/queries/why.h"
 
 namespace prescene::queries::given_queries {
 
@@ -28,6 +29,12 @@ extern const ExplainContext context;
 }  // namespace explain_h
 
 }  // namespace prescene::queries::given_queries
+
+namespace prescene::queries::given_queries::why_h {
+extern const ExplainContext frames_context;
+extern const PixelRatios pixel_ratios;
+extern const std::vector<WindowFrame> frames;
+}  // namespace prescene::queries::given_queries::why_h
 
 namespace prescene::queries::given_queries::relations_h {
 extern const QueryContext context;

@@ -33,6 +33,9 @@ struct TrackStateOptions {
 /// Whether the object is believed to be there: not lost, and more probably there than not.
 bool is_present(const belief::ObjectBelief& object);
 
+/// Whether others may take the object's surface for granted, where it hides them.
+bool hides_others(const belief::ObjectBelief& object);
+
 /// By how much the limits of evidence are lowered for a pose that, were it right, would say so much on average (nats
 /// per visible pixel): thin things on a known surface, transparent ones. In (0, 1], 1 for everything else.
 double evidence_scale(double expected_evidence);
