@@ -9,6 +9,7 @@
 #include "relations_options.h"
 #include "verb.h"
 #include "view_options.h"
+#include "why_options.h"
 
 namespace prescene::service {
 namespace {
@@ -128,6 +129,7 @@ std::string short_form(const nlohmann::ordered_json& answer) {
            stability_detail_text(*stability) + basis(*stability);
   }
   if (const auto explain = answer.find("explain"); explain != answer.end()) return explanation_text(*explain);
+  if (const auto why = answer.find("why"); why != answer.end()) return why_text(*why);
   if (const auto achieve = answer.find("achieve"); achieve != answer.end()) return achieve_text(*achieve);
   if (const auto relations = answer.find("relations"); relations != answer.end()) return relations_text(*relations);
   if (const auto timeline = answer.find("timeline"); timeline != answer.end()) return timeline_text(*timeline);

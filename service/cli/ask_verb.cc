@@ -16,6 +16,7 @@
 #include "relations_options.h"
 #include "verb.h"
 #include "view_options.h"
+#include "why_options.h"
 
 namespace prescene::service {
 namespace {
@@ -30,9 +31,10 @@ struct AskOptions {
   AchieveOptions achieve;
   TimelineOptions timeline;
   std::string reach;
-  std::optional<double> from, to, last;  // of explain, and ...
-  bool change = false;                   // ... the same
-  std::string wanted;
+  std::optional<double> from, to, last;  // of explain and why
+  bool change = false;                   // of explain, and ...
+  std::string wanted;                    // ... the same
+  std::string against;
   ViewQuestionOptions view;
   std::string scene;
   bool stream = false;
@@ -70,13 +72,26 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std:
     return core::invalid_input("--interval, --other and --relation are of 'ask timeline': leave them out");
   if (options.kind != "relations" && !options.reach.empty())
     return core::invalid_input("--reach is of 'ask relations': leave it out");
-  if (options.kind != "explain" &&
-      (options.from || options.to || options.last || options.change || !options.wanted.empty()))
-    return core::invalid_input("--from, --to, --last, --change and --wanted are of 'ask explain': leave them out");
+  const bool of_why = options.kind == "why";
+  if (options.kind != "explain" && !of_why && (options.from || options.to || options.last))
+    return core::invalid_input("--from, --to and --last are of 'ask explain' and 'ask why': leave them out");
+  if (options.kind != "explain" && (options.change || !options.wanted.empty()))
+    return core::invalid_input("--change and --wanted are of 'ask explain': leave them out");
+  if (!of_why && !options.against.empty()) return core::invalid_input("--against is of 'ask why': leave it out");
+  ViewQuestionOptions of_views = options.view;
+  if (of_why) of_views.images.clear();
   const bool of_view = options.kind == "view" || options.kind == "next_view";
-  if (!of_view && !(options.view == ViewQuestionOptions{}))
+  if (!of_view && !(of_views == ViewQuestionOptions{}))
     return core::invalid_input(
-        "--look-from, --look-at, --about and --images are of 'ask view' and 'ask next_view': leave them out");
+        "--look-from, --look-at and --about are of 'ask view' and 'ask next_view', --images is of 'ask view' and 'ask "
+        "why': leave them out");
+  if (of_why) {
+    if (!options.scene.empty())
+      return core::invalid_input(
+          "ask why is about frames that were seen, and of a scene file none was: ask a running 'serve' (without "
+          "--scene)");
+    return why_question(options.object, options.against, options.last, options.from, options.to);
+  }
   if (options.kind == "view") {
     if (!options.object.empty()) return core::invalid_input("ask view takes no object: leave it out");
     return view_question(options.view);
@@ -144,13 +159,13 @@ core::Result<nlohmann::ordered_json> question_of(const AskOptions& options, std:
     return achieve_question(achieve);
   }
   return core::invalid_input(
-      "ask where | relations | timeline | explain | view | next_view OBJECT | stability OBJECT | release OBJECT | "
-      "achieve "
-      "OUTCOME, or --question JSON");
+      "ask where | relations | timeline | explain | why OBJECT | view | next_view OBJECT | stability OBJECT | release "
+      "OBJECT | achieve OUTCOME, or --question JSON");
 }
 
 core::Status write_images(const AskOptions& options, const nlohmann::ordered_json& answer) {
   if (options.view.images.empty()) return core::ok_status();
+  if (const auto why = answer.find("why"); why != answer.end()) return write_why_images(*why, options.view.images);
   const auto view = answer.find("view");
   return view == answer.end() ? core::data_loss("the answer has no images")
                               : write_view_images(*view, options.view.images);
@@ -225,15 +240,16 @@ core::Status run(AskOptions& options, VerbContext& context) {
 Verb add_ask_verb(CLI::App& app) {
   auto* verb = app.add_subcommand("ask",
                                   "Ask a running `serve`, or a scene file: where | relations | timeline | explain | "
-                                  "view | next_view OBJECT | stability OBJECT | release OBJECT | achieve OUTCOME");
+                                  "why OBJECT | view | next_view OBJECT | stability OBJECT | release OBJECT | achieve "
+                                  "OUTCOME");
   auto options = std::make_shared<AskOptions>();
   verb->add_option("KIND", options->kind,
                    "where: poses and confidence; relations: what is on, in, held by what; timeline: what was when; "
-                   "explain: what happened in the last seconds; view: what a camera will see; next_view: from where a "
-                   "look would "
-                   "tell most; stability: does it stay; release: what if it is let "
+                   "explain: what happened in the last seconds; why: what frames and pixels say for a pose and against "
+                   "it; view: what a camera will see; next_view: from where a look would tell most; stability: does it "
+                   "stay; release: what if it is let "
                    "go; achieve: how must it be done")
-      ->type_name("TEXT:{where,relations,timeline,explain,view,next_view,stability,release,achieve}")
+      ->type_name("TEXT:{where,relations,timeline,explain,why,view,next_view,stability,release,achieve}")
       ->check(utf8_text());
   verb->add_option("OBJECT", options->object, "The object's name in the scene; of achieve, the outcome's")
       ->check(utf8_text());
@@ -252,16 +268,18 @@ Verb add_ask_verb(CLI::App& app) {
       ->check(utf8_text());
   add_timeline_options(*verb, options->timeline);
   add_view_question_options(*verb, options->view);
-  verb->add_option("--last", options->last, "Of explain: what happened in so many last seconds; default: 2")
+  verb->add_option("--last", options->last, "Of explain and why: the window, so many last seconds; default: 2")
       ->check(in_range(belief::kWindowSeconds));
-  verb->add_option("--from", options->from, "Of explain: start of the window, s since the session's first frame")
+  verb->add_option("--from", options->from,
+                   "Of explain and why: start of the window, s since the session's first frame")
       ->check(in_range(belief::kWindowEnds));
-  verb->add_option("--to", options->to, "Of explain: its end")->check(in_range(belief::kWindowEnds));
+  verb->add_option("--to", options->to, "Of explain and why: its end")->check(in_range(belief::kWindowEnds));
   verb->add_flag("--change", options->change,
                  "Of explain: also the smallest change that would have kept the object as it was");
   verb->add_option("--wanted", options->wanted,
                    "Of explain: the same for this outcome, a name of the scene's or one as JSON")
       ->check(utf8_text());
+  add_why_options(*verb, options->against);
   verb->add_option("--scene", options->scene, "Ask of this scene file instead of a running `serve`")
       ->check(file_name());
   verb->add_flag(

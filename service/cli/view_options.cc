@@ -90,34 +90,10 @@ std::size_t pixel_count(int width, int height) {
   return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 }
 
-/// Of any encoding that an answer has, as numbers; `scale` is put on where it is given.
-core::Result<geometry::Image<float>> numbers_of(const Json& image, const std::string& name) {
-  constexpr int kMostSide = 16384;
-  const int width = image.value("width", 0), height = image.value("height", 0);
-  const std::string encoding = image.value("encoding", "");
-  const std::size_t size = encoding == "32FC1" ? 4 : encoding == "16UC1" ? 2 : encoding == "mono8" ? 1 : 0;
-  if (size == 0 || width < 1 || height < 1 || width > kMostSide || height > kMostSide) return not_an_image(name);
-  // Before the image, whose size is the answer's word only.
-  const auto bytes = decoded(image.value("base64", ""), pixel_count(width, height) * size);
-  if (!bytes) return not_an_image(name);
-  geometry::Image<float> result(width, height);
-  const double scale = image.value("scale", 1.0);
-  for (std::size_t i = 0; i < result.size(); ++i) {
-    const std::uint8_t* const at = bytes->data() + i * size;
-    float number = 0.0F;
-    if (size == 4)
-      std::memcpy(&number, at, sizeof number);
-    else
-      number = static_cast<float>(size == 2 ? at[0] | at[1] << 8 : at[0]);
-    result.data()[i] = static_cast<float>(number * scale);
-  }
-  return result;
-}
-
 /// Whole numbers of `unit`; more than the largest is the largest.
 template <class Pixel>
 core::Status write_scaled(const Json& answer, const std::string& name, double unit, const std::filesystem::path& path) {
-  PRESCENE_TRY(const geometry::Image<float> image, numbers_of(answer, name));
+  PRESCENE_TRY(const geometry::Image<float> image, image_of_answer(answer, name));
   geometry::Image<Pixel> whole(image.width(), image.height());
   constexpr double kLargest = std::numeric_limits<Pixel>::max();
   for (std::size_t i = 0; i < image.size(); ++i) {
@@ -142,6 +118,29 @@ core::Status write_color(const Json& image, const std::filesystem::path& path) {
 
 }  // namespace
 
+core::Result<geometry::Image<float>> image_of_answer(const Json& image, const std::string& name) {
+  constexpr int kMostSide = 16384;
+  const int width = image.value("width", 0), height = image.value("height", 0);
+  const std::string encoding = image.value("encoding", "");
+  const std::size_t size = encoding == "32FC1" ? 4 : encoding == "16UC1" ? 2 : encoding == "mono8" ? 1 : 0;
+  if (size == 0 || width < 1 || height < 1 || width > kMostSide || height > kMostSide) return not_an_image(name);
+  // Before the image, whose size is the answer's word only.
+  const auto bytes = decoded(image.value("base64", ""), pixel_count(width, height) * size);
+  if (!bytes) return not_an_image(name);
+  geometry::Image<float> result(width, height);
+  const double scale = image.value("scale", 1.0);
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    const std::uint8_t* const at = bytes->data() + i * size;
+    float number = 0.0F;
+    if (size == 4)
+      std::memcpy(&number, at, sizeof number);
+    else
+      number = static_cast<float>(size == 2 ? at[0] | at[1] << 8 : at[0]);
+    result.data()[i] = static_cast<float>(number * scale);
+  }
+  return result;
+}
+
 void add_view_question_options(CLI::App& verb, ViewQuestionOptions& options) {
   verb.add_option(
           "--look-from", options.look_from,
@@ -155,7 +154,7 @@ void add_view_question_options(CLI::App& verb, ViewQuestionOptions& options) {
                   "Of next_view: what is to be learned: place (which alternative pose), pose or existence; default: "
                   "place")
       ->check(utf8_text());
-  verb.add_option("--images", options.images, "Of view: write its images to this folder, as PNG files")
+  verb.add_option("--images", options.images, "Of view and why: write the answer's images to this folder, as PNG files")
       ->check(file_name());
 }
 
@@ -173,7 +172,7 @@ core::Result<Json> view_question(const ViewQuestionOptions& options) {
 }
 
 core::Result<Json> next_view_question(const std::string& object, const ViewQuestionOptions& options) {
-  if (!options.images.empty()) return core::invalid_input("--images is of 'ask view': leave it out");
+  if (!options.images.empty()) return core::invalid_input("--images is of 'ask view' and 'ask why': leave it out");
   if (object.empty()) return core::invalid_input("ask next_view OBJECT: name the object");
   if (options.look_from.empty() || options.look_at.empty())
     return core::invalid_input(

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "prescene/core/status.h"
+#include "prescene/geometry/image.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the library's own
 class App;
@@ -27,6 +28,9 @@ void add_view_question_options(CLI::App& verb, ViewQuestionOptions& options);
 core::Result<nlohmann::ordered_json> view_question(const ViewQuestionOptions& options);
 /// {"next_view": {...}}.
 core::Result<nlohmann::ordered_json> next_view_question(const std::string& object, const ViewQuestionOptions& options);
+
+/// An image of an answer, of any encoding that answers have, as numbers. kDataLoss for another form.
+core::Result<geometry::Image<float>> image_of_answer(const nlohmann::ordered_json& image, const std::string& name);
 
 /// What the answers say, in sentences; `answer` as in the task of an answer.
 std::string view_text(const nlohmann::ordered_json& answer);

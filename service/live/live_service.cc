@@ -9,6 +9,7 @@
 #include "live_service_impl.h"
 #include "prescene/core/clock.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/recording/why_answer.h"
 #include "prescene/service/tracking/camera_presets.h"
 
 namespace prescene::service {
@@ -125,6 +126,9 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   impl->settings.worker.explain = [raw](const belief::ExplainQuestion& question, const queries::QueryContext& context) {
     return raw->explain(question, context);
   };
+  impl->settings.worker.why = [raw](const belief::WhyQuestion& question, const queries::QueryContext& context) {
+    return raw->why(question, context);
+  };
   impl->worker = std::make_unique<QueryWorker>(
       backends, backends.pool().threads(), impl->settings.worker, [raw] { return raw->tracker->belief(); }, on_answer);
   impl->running = settings.tracker;
@@ -230,16 +234,28 @@ core::Status LiveService::Impl::join_bus() {
   return core::ok_status();
 }
 
-core::Result<nlohmann::ordered_json> LiveService::Impl::explain(const belief::ExplainQuestion& question,
-                                                                const queries::QueryContext& context) {
-  PRESCENE_TRY(PastWindow past, frames.window(question));
+core::Result<queries::ExplainContext> LiveService::Impl::frames_context(const queries::QueryContext& context) {
   if (!explaining) {
     PRESCENE_TRY(explaining, backends->make_likelihood());
   }
-  const queries::ExplainContext explain_context{context, explaining.get(), settings.tracker.filter};
+  return queries::ExplainContext{context, explaining.get(), settings.tracker.filter};
+}
+
+core::Result<nlohmann::ordered_json> LiveService::Impl::explain(const belief::ExplainQuestion& question,
+                                                                const queries::QueryContext& context) {
+  PRESCENE_TRY(PastWindow past, frames.window(question));
+  PRESCENE_TRY(const queries::ExplainContext explain_context, frames_context(context));
   PRESCENE_TRY(const Explained explained,
                explain_past(std::move(past), question, settings.event_weights, explain_context));
   return explain_answer_json(question, explained);
+}
+
+core::Result<nlohmann::ordered_json> LiveService::Impl::why(const belief::WhyQuestion& question,
+                                                            const queries::QueryContext& context) {
+  PRESCENE_TRY(const PastWindow past, frames.window(asked_window(question)));
+  PRESCENE_TRY(const queries::ExplainContext explain_context, frames_context(context));
+  PRESCENE_TRY(const Reasons reasons, why_past(past, question, explain_context));
+  return why_answer_json(question, reasons);
 }
 
 core::TimeNs LiveService::Impl::now() {

@@ -119,6 +119,9 @@ struct LiveService::Impl {
   /// Called on the threads that simulate for questions, on one at a time.
   core::Result<nlohmann::ordered_json> explain(const belief::ExplainQuestion& question,
                                                const queries::QueryContext& context);
+  /// Called as explain(), and not while it is.
+  core::Result<nlohmann::ordered_json> why(const belief::WhyQuestion& question, const queries::QueryContext& context);
+  core::Result<queries::ExplainContext> frames_context(const queries::QueryContext& context);
 
   std::shared_ptr<const belief::Scene> scene;
   LiveSettings settings;
@@ -133,7 +136,7 @@ struct LiveService::Impl {
   Inbox inbox;
   RateLimit marker_limit;
   RateLimit diagnostics_limit;
-  FrameHistory frames;  // for questions what happened
+  FrameHistory frames;  // for questions what happened, and why a pose is believed
   RateLimit learned_limit;
 
   interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers, answers_so_far;
@@ -156,7 +159,7 @@ struct LiveService::Impl {
   std::uint64_t idle_controls = 0;
   std::string last_idle_control;
   Backends* backends = nullptr;
-  std::unique_ptr<rendering::LikelihoodBatch> explaining;  // of explain(); made when it is needed
+  std::unique_ptr<rendering::LikelihoodBatch> explaining;  // of explain() and why(); made when needed
   /// Since the last frame that was used, s; by simulated time where there is one.
   std::optional<double> seconds_since_frame() const;
 

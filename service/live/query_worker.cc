@@ -211,6 +211,10 @@ void QueryWorker::read(const std::string& question_json, const std::string& clie
       auto read = belief::explain_question_from_json(question_json);
       if (!read) return refuse(id_of(question_json), read.status());
       question = std::make_shared<const Question>(*std::move(read));
+    } else if (belief::asks_why(question_json)) {
+      auto read = belief::why_question_from_json(question_json);
+      if (!read) return refuse(id_of(question_json), read.status());
+      question = std::make_shared<const Question>(*std::move(read));
     } else {
       auto read = belief::query_from_json(question_json);
       if (!read) return refuse(id_of(question_json), read.status());
@@ -275,12 +279,12 @@ void QueryWorker::cancel(const CancelRequest& request) {
 }
 
 std::optional<FairQueue<QueryWorker::Work>::Entry> QueryWorker::take_next() {
-  const auto explains = [](const Work& work) {
-    return work.question && std::holds_alternative<belief::ExplainQuestion>(*work.question);
+  const auto is_of_frames = [](const Work& work) {
+    return work.question && !std::holds_alternative<belief::Query>(*work.question);
   };
   return waiting_.pop_if([&](const std::string& client, const Work& work) {
     return std::none_of(in_work_.begin(), in_work_.end(), [&](const Simulating& one) {
-      return one.work.question && (one.client == client || (explains(one.work) && explains(work)));
+      return one.work.question && (one.client == client || (is_of_frames(one.work) && is_of_frames(work)));
     });
   });
 }
@@ -347,6 +351,26 @@ std::function<void(const belief::Answer&)> QueryWorker::so_far_of(const belief::
   };
 }
 
+template <class FrameQuestion, class AnswerIt>
+QueryWorker::Reply QueryWorker::reply_from_frames(const FrameQuestion& question, const AnswerIt& answer_it,
+                                                  queries::QueryContext context, const core::Cancellation& cancelled) {
+  if (!answer_it)
+    return {error_answer(question.id, core::unavailable("frames are not kept here, so that nothing can be explained")),
+            false};
+  if (question.max_seconds)
+    context.simulate_until = std::min(*context.simulate_until, queries::deadline_after(*question.max_seconds));
+  auto document = answer_it(question, context);
+  if (document && question.stream) (*document)["final"] = true;
+  if (document) return {belief::json_text(*document), true};
+  // Its time was over in the middle of a search, unless somebody stopped it.
+  const bool too_late = document.status().code() == core::StatusCode::kCancelled && !cancelled.requested();
+  return {error_answer(question.id,
+                       too_late ? core::unavailable("the time ran out: give an object, a shorter window or fewer "
+                                                    "points, or let questions take longer (--most-question-seconds)")
+                                : document.status()),
+          false};
+}
+
 QueryWorker::Reply QueryWorker::reply_to(const Question& question, const core::Cancellation& cancelled,
                                          core::ThreadPool& pool) {
   queries::QueryContext context = backends_.query_context(pool);
@@ -359,7 +383,9 @@ QueryWorker::Reply QueryWorker::reply_to(const Question& question, const core::C
   if (&cancelled != &stop_) context.progress = progress_of(id_in(question));  // `where` is answered at once
   if (context.progress) context.progress({0.0, std::nullopt, "begun"});
   if (const auto* to_explain = std::get_if<belief::ExplainQuestion>(&question))
-    return reply_to(*to_explain, context, cancelled);
+    return reply_from_frames(*to_explain, settings_.explain, context, cancelled);
+  if (const auto* why = std::get_if<belief::WhyQuestion>(&question))
+    return reply_from_frames(*why, settings_.why, context, cancelled);
   const auto& query = std::get<belief::Query>(question);
   context.on_answer_so_far = so_far_of(query);
   return reply_to(query, context);
@@ -376,25 +402,6 @@ QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query, const queri
       begin_ns != 0 && std::holds_alternative<belief::WhereAnswer>(answer.what))
     add_learned_seconds(begin_ns, document["where"]["items"]);
   return {belief::json_text(document), answer.what.index() > 0};
-}
-
-QueryWorker::Reply QueryWorker::reply_to(const belief::ExplainQuestion& question, queries::QueryContext context,
-                                         const core::Cancellation& cancelled) {
-  if (!settings_.explain)
-    return {error_answer(question.id, core::unavailable("frames are not kept here, so that nothing can be explained")),
-            false};
-  if (question.max_seconds)
-    context.simulate_until = std::min(*context.simulate_until, queries::deadline_after(*question.max_seconds));
-  auto document = settings_.explain(question, context);
-  if (document && question.stream) (*document)["final"] = true;
-  if (document) return {belief::json_text(*document), true};
-  // Its time was over in the middle of a search, unless somebody stopped it.
-  const bool too_late = document.status().code() == core::StatusCode::kCancelled && !cancelled.requested();
-  return {error_answer(question.id,
-                       too_late ? core::unavailable("the time ran out: give an object, a shorter window or fewer "
-                                                    "points, or let questions take longer (--most-question-seconds)")
-                                : document.status()),
-          false};
 }
 
 void QueryWorker::refuse(const std::string& id, const core::Status& reason) {

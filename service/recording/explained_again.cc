@@ -2,6 +2,7 @@
 #include "prescene/service/recording/explained_again.h"
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/outside_json.h"
+#include "prescene/service/recording/why_answer.h"
 
 namespace prescene::service {
 namespace {
@@ -41,9 +43,9 @@ bool may_hold_explanations(const std::filesystem::path& path, const ReplayInput&
     if (!answer) return true;
     if (!*answer) return false;
     const std::vector<std::uint8_t>& data = (*answer)->data;
-    if (std::string_view(reinterpret_cast<const char*>(data.data()), data.size()).find("\"explain\"") !=
-        std::string_view::npos)
-      return true;
+    const std::string_view text(reinterpret_cast<const char*>(data.data()), data.size());
+    for (const char* key : {"\"explain\"", "\"why\""})
+      if (text.find(key) != std::string_view::npos) return true;
   }
 }
 
@@ -52,8 +54,10 @@ constexpr core::TimeNs kDisorderNs = 10 * core::TimeNs{1'000'000'000};
 
 /// What is compared: not how long it took.
 std::string text_to_compare(nlohmann::ordered_json answer) {
-  nlohmann::ordered_json& explained = answer["explain"];
-  for (const char* key : {"wall_seconds", "cpu_seconds"}) explained.erase(key);
+  for (const char* task : {"explain", "why"})
+    if (answer.contains(task))
+      for (const char* key : {"wall_seconds", "cpu_seconds"}) answer[task].erase(key);
+  answer.erase("final");  // of one that was to be streamed
   return belief::json_text(answer);
 }
 
@@ -96,6 +100,21 @@ core::Status ExplainedAgain::read_controls(core::TimeNs until_ns) {
   return core::ok_status();
 }
 
+core::Result<queries::ExplainContext> ExplainedAgain::frames_context() {
+  if (!likelihood_) {
+    PRESCENE_TRY(likelihood_, backends_.make_likelihood());
+  }
+  queries::ExplainContext context{backends_.query_context(backends_.pool()), likelihood_.get(), settings_.filter};
+  context.simulation.cancellation = &cancellation_;
+  return context;
+}
+
+core::Result<std::string> ExplainedAgain::reasoned(const belief::WhyQuestion& question, const PastWindow& past) {
+  PRESCENE_TRY(const queries::ExplainContext context, frames_context());
+  PRESCENE_TRY(const Reasons found, why_past(past, question, context));
+  return text_to_compare(why_answer_json(question, found));
+}
+
 core::Result<std::string> ExplainedAgain::explained(const belief::ExplainQuestion& question, PastWindow past,
                                                     core::TimeNs recorded_ns) {
   PRESCENE_RETURN_IF_ERROR(read_controls(recorded_ns));
@@ -109,27 +128,35 @@ core::Result<std::string> ExplainedAgain::explained(const belief::ExplainQuestio
     if (!of_scene) return of_scene.status();
     weights = *of_scene;
   }
-  if (!likelihood_) {
-    PRESCENE_TRY(likelihood_, backends_.make_likelihood());
-  }
-  queries::ExplainContext context{backends_.query_context(backends_.pool()), likelihood_.get(), settings_.filter};
-  context.simulation.cancellation = &cancellation_;
+  PRESCENE_TRY(const queries::ExplainContext context, frames_context());
   PRESCENE_TRY(const Explained found, explain_past(std::move(past), question, weights, context));
   return text_to_compare(explain_answer_json(question, found));
 }
 
 core::Status ExplainedAgain::add_answer(const std::string& json, core::TimeNs recorded_ns) {
   const auto answer = parse_or_discard(json);
-  if (!answer.is_object() || !answer.contains("explain") || !answer["explain"].is_object()) return core::ok_status();
-  const auto& recorded = answer["explain"];
+  if (!answer.is_object()) return core::ok_status();
+  const std::string task = answer.contains("why") ? "why" : "explain";
+  if (!answer.contains(task) || !answer[task].is_object()) return core::ok_status();
+  const auto& recorded = answer[task];
   const auto cut_short = recorded.find("cut_short");
   if (!recorded.contains("asked") || (cut_short != recorded.end() && *cut_short == true)) return core::ok_status();
-  const auto question = belief::explain_question_from_json(
-      belief::json_text({{"id", id_of_document(answer)}, {"explain", recorded["asked"]}}));
-  if (!question) return question.status().at("a recorded answer");
-  auto past = history_.window(*question);
-  if (!past) return core::ok_status();
-  const auto again = explained(*question, *std::move(past), recorded_ns);
+  const std::string asked = belief::json_text({{"id", id_of_document(answer)}, {task, recorded["asked"]}});
+  std::optional<core::Result<std::string>> again;
+  if (task == "why") {
+    const auto question = belief::why_question_from_json(asked);
+    if (!question) return question.status().at("a recorded answer");
+    if (const auto past = history_.window(asked_window(*question))) again = reasoned(*question, *past);
+  } else {
+    const auto question = belief::explain_question_from_json(asked);
+    if (!question) return question.status().at("a recorded answer");
+    if (auto past = history_.window(*question)) again = explained(*question, *std::move(past), recorded_ns);
+  }
+  if (!again) return core::ok_status();  // the frames are not kept any more
+  return compare(answer, *again);
+}
+
+core::Status ExplainedAgain::compare(const nlohmann::ordered_json& answer, const core::Result<std::string>& again) {
   if (!again && again.status().code() == core::StatusCode::kCancelled) return again.status();
   ++compared_;
   if (again && *again == text_to_compare(answer)) return core::ok_status();

@@ -18,6 +18,7 @@ using core::fixed_text;
 using nlohmann::ordered_json;
 
 constexpr std::size_t kMostControls = 1000;
+constexpr double kLastSeconds = 2.0;  // of a window that nobody gave
 constexpr core::TimeNs kWindowRoundingNs = 1000;
 constexpr core::TimeNs kOtherClockNs = 3600 * core::TimeNs{1'000'000'000};
 // s by which frames may come earlier than the rate allows: their stamps jitter.
@@ -162,6 +163,10 @@ void FrameHistory::add_control(const std::string& json, core::TimeNs sent_ns) {
 }
 
 core::Result<PastWindow> FrameHistory::window(const belief::ExplainQuestion& question) const {
+  return window(AskedWindow{question.from, question.to, question.last});
+}
+
+core::Result<PastWindow> FrameHistory::window(const AskedWindow& question) const {
   if (!(seconds_ > 0.0))
     return core::unavailable("no frames are kept, so that nothing can be explained: start 'serve' with --history");
   const std::lock_guard lock(mutex_);
@@ -169,8 +174,10 @@ core::Result<PastWindow> FrameHistory::window(const belief::ExplainQuestion& que
   const auto stamp = [&](std::size_t i) { return kept_[i].frame.observation.stamp_ns; };
   const core::TimeNs newest_ns = stamp(kept_.size() - 1);
   const core::TimeNs to_ns = question.to ? first_ns_ + core::ns_of(*question.to) : newest_ns;
-  const core::TimeNs from_ns =
-      question.from ? first_ns_ + core::ns_of(*question.from) : to_ns - core::ns_of(question.last);
+  const core::TimeNs last_from_ns = to_ns - core::ns_of(question.last.value_or(kLastSeconds));
+  const core::TimeNs from_ns = question.from   ? first_ns_ + core::ns_of(*question.from)
+                               : question.last ? last_from_ns
+                                               : std::max(last_from_ns, stamp(0));
   const auto seconds = [&](core::TimeNs time_ns) { return core::seconds_of(time_ns - first_ns_); };
   const std::string asked =
       "the window from " + fixed_text(seconds(from_ns), 2) + " to " + fixed_text(seconds(to_ns), 2) + " s ";
@@ -187,6 +194,7 @@ core::Result<PastWindow> FrameHistory::window(const belief::ExplainQuestion& que
   if (core::seconds_of(to_ns - newest_ns) > between + 0.01)
     return core::invalid_input(asked + "ends after the newest frame: " + held);
   PastWindow past;
+  past.first_ns = first_ns_;
   past.window.start = kept_[next - 1].frame.belief;
   past.from = seconds(stamp(next - 1));
   for (; next < kept_.size() && stamp(next) <= to_ns + kWindowRoundingNs; ++next)

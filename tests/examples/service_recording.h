@@ -12,6 +12,7 @@
 #include "prescene/service/recording/replay_input.h"
 #include "prescene/service/recording/simulated_recording.h"
 #include "prescene/service/recording/tracking_score.h"
+#include "prescene/service/recording/why_answer.h"
 #include "prescene/service/tracking/tracker.h"
 #include "prescene/service/tracking/tracker_settings.h"
 
@@ -50,6 +51,12 @@ extern const belief::ExplainQuestion question;
 extern const belief::EventWeights weights;
 extern const queries::ExplainContext context;
 }  // namespace frame_history_h
+
+namespace why_answer_h {
+extern const FrameHistory history;
+extern const belief::WhyQuestion question;
+extern const queries::ExplainContext context;
+}  // namespace why_answer_h
 
 namespace explained_again_h {
 extern const ReplayInput input;

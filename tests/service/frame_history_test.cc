@@ -12,6 +12,7 @@
 #include "prescene/rendering/sensor/likelihood_batch.h"
 #include "prescene/service/pictures/explanation_strip.h"
 #include "prescene/service/recording/replay_input.h"
+#include "prescene/service/recording/why_answer.h"
 #include "prescene/service/tracking/tracker.h"
 #include "tests/service/recorded_box.h"
 #include "tests/support/paths.h"
@@ -236,6 +237,15 @@ class TrackedRecording {
     EXPECT_EQ(answer["explain"].erase("cpu_seconds"), 1u);
     return answer;
   }
+  core::Result<nlohmann::ordered_json> why(const belief::WhyQuestion& question) {
+    PRESCENE_TRY(const PastWindow past, history_.window(asked_window(question)));
+    PRESCENE_TRY(const auto likelihood, backends_.make_likelihood());
+    const queries::ExplainContext context{backends_.query_context(pool_), likelihood.get(), {}};
+    PRESCENE_TRY(const Reasons reasons, why_past(past, question, context));
+    nlohmann::ordered_json answer = why_answer_json(question, reasons);
+    for (const char* key : {"wall_seconds", "cpu_seconds"}) EXPECT_EQ(answer["why"].erase(key), 1u);
+    return answer;
+  }
   Backends& backends() { return backends_; }
 
  private:
@@ -301,6 +311,49 @@ TEST(FrameHistory, ExplainsWithTheSameBitsOnAnyThreadsAndWhenAskedAgain) {
   EXPECT_FALSE(taken->answer.change);
   EXPECT_THAT(taken->answer.remarks,
               ::testing::Contains(HasSubstr("No smallest change is worked out of 'taken_away'")));
+}
+
+TEST(FrameHistory, GivesAsMuchOfAWindowThatNobodyAskedForAsItHas) {
+  FrameHistory history({.seconds = 10.0, .rate = 100.0});
+  fill(history, 1.0, 10.0);
+  const auto window = history.window(AskedWindow{});
+  ASSERT_TRUE(window.ok()) << window.status().message();
+  EXPECT_NEAR(window->from, 0.0, 1e-9);
+  EXPECT_EQ(window->window.frames.size(), 10u);
+  EXPECT_EQ(window->first_ns, kBegin);
+  fill(history, 5.0, 10.0);  // the clock goes back
+  EXPECT_NEAR(history.window(AskedWindow{})->from, 3.0, 1e-9);
+  EXPECT_FALSE(history.window(AskedWindow{.from = {}, .to = {}, .last = 30.0}).ok());
+}
+
+TEST(FrameHistory, SaysWhyAPoseIsBelievedWithTheSameBitsOnAnyThreadsAndWhenAskedAgain) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "box.mcap";
+  record_change(tests::box_on_table("1.6", ", normal: {position: [0.003, 0.003, 0]}"), {1.5, "box", std::nullopt},
+                path);
+  TrackedRecording on_one(path, 1), on_two(path, 2);
+  belief::WhyQuestion question;
+  question.id = "why";
+  question.object = "box";
+  question.from = 0.2;
+  question.to = 1.2;
+  question.images = 2;
+  const auto one = on_one.why(question), two = on_two.why(question);
+  ASSERT_TRUE(one.ok()) << one.status().message();
+  EXPECT_EQ(*one, *two);
+  const nlohmann::ordered_json& why = one->at("why");
+  EXPECT_EQ(why["comparisons"][0]["against"], "absence");
+  EXPECT_GT(why["comparisons"][0]["tempered"].get<double>(), 10.0) << why["text"];
+  EXPECT_EQ(why["comparisons"][0]["images"].size(), 2u);
+  EXPECT_EQ(why["frames"].size(), why["comparisons"][0]["frames"].size());
+  EXPECT_EQ(why["frames"][0]["pixels"]["hidden"], 0);
+  const auto asked = belief::why_question_from_json(belief::json_text({{"id", "why"}, {"why", why["asked"]}}));
+  ASSERT_TRUE(asked.ok()) << asked.status().message();
+  EXPECT_EQ(*on_one.why(*asked), *one);
+  question.object = "bx";
+  EXPECT_THAT(on_one.why(question).status().message(), HasSubstr("did you mean 'box'?"));
+  question.to = 90.0;
+  EXPECT_THAT(on_one.why(question).status().message(), HasSubstr("ends after the newest frame"));
 }
 
 TEST(ExplanationStrip, ColoursWhatIsNearerAndWhatIsFurther) {

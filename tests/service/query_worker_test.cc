@@ -299,5 +299,27 @@ TEST(QueryWorker, PassesOnWhatAsksForAnExplanation) {
   EXPECT_THAT(without.answers(2)[1], HasSubstr("\"items\""));
 }
 
+TEST(QueryWorker, PassesOnWhatAsksWhyAPoseIsBelieved) {
+  QueryWorkerSettings settings;
+  settings.why = [](const belief::WhyQuestion& question,
+                    const queries::QueryContext& context) -> core::Result<nlohmann::ordered_json> {
+    EXPECT_TRUE(context.simulate_until);
+    if (question.object == "nobody") return core::not_found("there is no object 'nobody'");
+    return nlohmann::ordered_json{{"id", question.id}, {"step", 4}, {"why", {{"object", question.object}}}};
+  };
+  WorkerUnderTest worker(settings);
+  worker.ask(R"({"id": "1", "why": {"object": "box"}})");
+  EXPECT_EQ(worker.answers(1)[0], R"({"id":"1","step":4,"why":{"object":"box"}})");
+  worker.ask(R"({"id": "2", "why": {"object": "nobody"}})");
+  EXPECT_EQ(parse_or_discard(worker.answers(2)[1])["code"], "not_found");
+  worker.ask(R"({"id": "3", "why": {"object": "box", "agianst": "absence"}})");
+  EXPECT_THAT(worker.answers(3)[2], HasSubstr("did you mean 'against'?"));
+  EXPECT_EQ(worker.counts().answered, 1u);
+  EXPECT_EQ(worker.counts().refused, 2u);
+  WorkerUnderTest without({});
+  without.ask(R"({"id": "4", "why": {"object": "box"}})");
+  EXPECT_THAT(without.answers(1)[0], HasSubstr("frames are not kept here"));
+}
+
 }  // namespace
 }  // namespace prescene::service

@@ -233,6 +233,12 @@ TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
                     bus_);
     ASSERT_EQ(why.exit_code, 0) << why.err;
     EXPECT_EQ(parsed(why)["explain"]["explanations"][0]["event"], "nothing") << why.out;
+    const Finished reasons =
+        run_program({"ask", "why", "box", "--against", "absence", "--images", path("why"), "--json"}, bus_);
+    ASSERT_EQ(reasons.exit_code, 0) << reasons.err;
+    EXPECT_GT(parsed(reasons)["why"]["comparisons"][0]["tempered"].get<double>(), 1.0) << reasons.out;
+    EXPECT_FALSE(std::filesystem::is_empty(path("why")));
+    EXPECT_EQ(run_program({"ask", "why", "bx"}, bus_).exit_code, 2);
     const Finished too_early = run_program({"ask", "explain", "--last", "500"}, bus_);
     EXPECT_EQ(too_early.exit_code, 2) << too_early.out;
     EXPECT_NE(too_early.err.find("the history holds"), std::string::npos) << too_early.err;
@@ -244,7 +250,7 @@ TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
   EXPECT_TRUE(json["followed_step_records"].get<bool>());
   EXPECT_GT(json["compared_steps"].get<int>(), 0);
   EXPECT_EQ(json["different_steps"], 0);
-  EXPECT_EQ(json["compared_explanations"], 1);
+  EXPECT_EQ(json["compared_explanations"], 2);  // what happened, and why
   EXPECT_EQ(json["different_explanations"], 0) << again.err;
   // The service's own settings are in the recording, and explain has fewer options than replay to replace them by.
   const Finished explained = run_program(

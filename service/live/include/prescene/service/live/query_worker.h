@@ -24,6 +24,7 @@
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/explain_question.h"
+#include "prescene/belief/why_question.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/progress.h"
 #include "prescene/core/status.h"
@@ -50,6 +51,10 @@ struct QueryWorkerSettings {
   std::function<core::Result<nlohmann::ordered_json>(const belief::ExplainQuestion& question,
                                                      const queries::QueryContext& context)>
       explain = {};
+  /// The same of belief::WhyQuestion; not called while `explain` is.
+  std::function<core::Result<nlohmann::ordered_json>(const belief::WhyQuestion& question,
+                                                     const queries::QueryContext& context)>
+      why = {};
   /// Told how far the work on a question with an id is, as JSON: {"id", "fraction", "text", "seconds_left" (null while
   /// there is no estimate)}. Called on the threads that simulate when work begins and some times a second after that;
   /// may be empty.
@@ -121,7 +126,7 @@ class QueryWorker {
   void begin_session(core::TimeNs first_frame_ns) { session_begin_ns_ = first_frame_ns; }
 
  private:
-  using Question = std::variant<belief::Query, belief::ExplainQuestion>;
+  using Question = std::variant<belief::Query, belief::ExplainQuestion, belief::WhyQuestion>;
   /// A question to simulate, and what ends the work on it.
   struct Work {
     std::shared_ptr<const Question> question;  ///< Null: none.
@@ -166,8 +171,10 @@ class QueryWorker {
   core::ProgressSink progress_of(const std::string& id) const;
   std::function<void(const belief::Answer&)> so_far_of(const belief::Query& query) const;
   Reply reply_to(const belief::Query& query, const queries::QueryContext& context);
-  Reply reply_to(const belief::ExplainQuestion& question, queries::QueryContext context,
-                 const core::Cancellation& cancelled);
+  /// Of what is asked about frames; `answer_it`: QueryWorkerSettings' for this kind.
+  template <class FrameQuestion, class AnswerIt>
+  Reply reply_from_frames(const FrameQuestion& question, const AnswerIt& answer_it, queries::QueryContext context,
+                          const core::Cancellation& cancelled);
   /// In a handler, of an exception while `doing`: counts it as a failure unless the memory ended, and says what to
   /// refuse the question with.
   core::Status note_exception(const char* doing);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Answers to what happened that a session recorded, worked out again when it is replayed: with the same beliefs, they
-// have the same bits.
+// Answers to what happened, and to why a pose is believed, that a session recorded, worked out again when it is
+// replayed: with the same beliefs, they have the same bits.
 //
 //   ExplainedAgain again(input, "session.mcap", settings, backends, cancellation);
 //   again.add(step.observation, tracker.belief());            // after each step of the replay
@@ -11,9 +11,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "prescene/belief/why_question.h"
 #include "prescene/service/recording/frame_history.h"
 #include "prescene/service/recording/replay_input.h"
 
@@ -26,10 +28,10 @@ class ExplainedAgain {
   ExplainedAgain(const ReplayInput& input, std::filesystem::path path, const TrackerSettings& settings,
                  Backends& backends, const core::Cancellation& cancellation);
 
-  /// Keeps nothing if the recording holds no explanation.
+  /// Keeps nothing if the recording holds no such answer.
   void add(const belief::Observation& observation, std::shared_ptr<const belief::Belief> belief);
-  /// An answer of /prescene/answer and when it was recorded. Others than explanations, those that were cut short by
-  /// their time, and those about more than 300 s before are passed over. Errors of reading the recording, which says
+  /// An answer of /prescene/answer and when it was recorded. Others than these, those that were cut short by their
+  /// time, and those about more than 300 s before are passed over. Errors of reading the recording, which says
   /// what the robot did; kCancelled.
   core::Status add_answer(const std::string& json, core::TimeNs recorded_ns);
 
@@ -45,8 +47,12 @@ class ExplainedAgain {
   };
   /// Reads on, up to what was received by then.
   core::Status read_controls(core::TimeNs until_ns);
+  core::Result<queries::ExplainContext> frames_context();
   core::Result<std::string> explained(const belief::ExplainQuestion& question, PastWindow past,
                                       core::TimeNs recorded_ns);
+  core::Result<std::string> reasoned(const belief::WhyQuestion& question, const PastWindow& past);
+  /// Counts; kCancelled where working it out again was.
+  core::Status compare(const nlohmann::ordered_json& answer, const core::Result<std::string>& again);
 
   std::filesystem::path path_;
   bool reads_all_parts_;

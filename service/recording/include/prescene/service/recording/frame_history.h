@@ -59,9 +59,17 @@ class ControlLog {
   std::deque<Known> known_;
 };
 
+/// Which window of the history is asked for.
+struct AskedWindow {
+  std::optional<double> from, to;  ///< s since the session's first frame; both or neither.
+  /// s before the newest frame, where `from` is not given; empty: 2 s, or as much of them as is kept.
+  std::optional<double> last;
+};
+
 /// A window of the history.
 struct PastWindow {
   queries::ExplainWindow window;
+  core::TimeNs first_ns = 0;    ///< Stamp of the session's first frame.
   double from = 0.0, to = 0.0;  ///< s since the session's first frame: of the start, and of the last frame.
   std::vector<std::string> remarks;
 };
@@ -78,6 +86,7 @@ class FrameHistory {
   /// kUnavailable where nothing is kept, or no frame came yet; kInvalidInput for a window that is not in the history,
   /// naming what is.
   core::Result<PastWindow> window(const belief::ExplainQuestion& question) const;
+  core::Result<PastWindow> window(const AskedWindow& asked) const;
 
   /// Instead of FrameHistorySettings::seconds: what is older is forgotten with the next frame, with 0 at once.
   void keep(double seconds);
