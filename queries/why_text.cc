@@ -85,10 +85,10 @@ std::string text_of(const WhyComparison& c, const WhyAnswer& answer, const geome
   std::string text = claim_of(c, answer, symmetry) + frames_text(c.frames.size()) + " " +
                      from_to_text(seconds(0), seconds(answer.views.size() - 1)) + " ";
   if (std::abs(c.tempered) < kNothing)
-    text += "say nothing for it or against it";
+    text += std::string(c.frames.size() == 1 ? "says" : "say") + " nothing for it or against it";
   else
-    text += "speak " + std::string(c.tempered > 0.0 ? "for" : "against") + " it by " +
-            fixed_text(std::abs(c.tempered), 1) + " nats (" + fixed_text(std::abs(c.log_ratio), 0) +
+    text += std::string(c.frames.size() == 1 ? "speaks " : "speak ") + (c.tempered > 0.0 ? "for" : "against") +
+            " it by " + fixed_text(std::abs(c.tempered), 1) + " nats (" + fixed_text(std::abs(c.log_ratio), 0) +
             " before tempering)";
   const std::string terms = terms_text(c);
   text += terms.empty() ? ". " : ": " + terms + ". ";
@@ -96,9 +96,9 @@ std::string text_of(const WhyComparison& c, const WhyAnswer& answer, const geome
   if (!c.deciding.empty() && c.deciding.size() < c.frames.size()) {
     double sum = 0.0;
     for (const std::size_t k : c.deciding) sum += c.frames[k].tempered;
-    text += frames_text(c.deciding.size()) + " " +
-            from_to_text(seconds(c.deciding.front()), seconds(c.deciding.back())) +
-            " decide: " + (sum > 0.0 ? "+" : "") + fixed_text(sum, 1) + " nats. ";
+    text +=
+        frames_text(c.deciding.size()) + " " + from_to_text(seconds(c.deciding.front()), seconds(c.deciding.back())) +
+        (c.deciding.size() == 1 ? " decides: " : " decide: ") + (sum > 0.0 ? "+" : "") + fixed_text(sum, 1) + " nats. ";
   }
   if (c.place && !c.place->in_image.empty())
     text += "In the frame that says most, what says it lies " + c.place->in_image + " of it. ";
@@ -121,7 +121,7 @@ std::string seen_text(const WhyAnswer& answer) {
     visible += view.evidence.visible;
     for (const HiddenBy& by : view.hidden_by) hiding[name_of(by)] += by.pixels;
   }
-  if (in_view == 0) return answer.object + " is out of view in all of them: they say nothing of it.";
+  if (in_view == 0) return answer.object + " is out of view: nothing is said of it.";
   std::vector<std::pair<int, std::string>> by;
   for (const auto& [name, pixels] : hiding)
     if (pixels >= kNamedShare * in_view) by.emplace_back(pixels, name);
@@ -130,8 +130,7 @@ std::string seen_text(const WhyAnswer& answer) {
   for (const auto& [pixels, name] : by)
     hidden += (hidden.empty() ? "" : ", ") + percent_of(pixels, in_view) + " hidden by " + name;
   if (covered == 0)
-    return answer.object + " is hidden in all of them" + (hidden.empty() ? "" : " (" + hidden + ")") +
-           ": they say nothing of it.";
+    return answer.object + " is hidden" + (hidden.empty() ? "" : " (" + hidden + ")") + ": nothing is said of it.";
   std::string text = "Of its pixels, " + percent_of(visible, in_view) + " are seen";
   if (!hidden.empty()) text += ", " + hidden;
   if (measured - visible >= kNamedShare * in_view)

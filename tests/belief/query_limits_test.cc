@@ -156,7 +156,8 @@ TEST(WhyQuestion, IsReadAsItIsWritten) {
   const auto again = [](const WhyQuestion& asked) { return why_question_from_json(json_text(to_json(asked))); };
   EXPECT_EQ(*again(question), question);
   question.against = WhyAgainst::kPose;
-  question.X_WO = Pose{Quaterniond(Eigen::AngleAxisd(0.3, Vector3d(1.0, 2.0, 3.0).normalized())), {0.1, 0.2, 0.3}};
+  question.X_WO =
+      Pose{geometry::Quaterniond(Eigen::AngleAxisd(0.3, Vector3d(1.0, 2.0, 3.0).normalized())), {0.1, 0.2, 0.3}};
   question.last = 1.5;
   question.images = 0;
   question.max_seconds = 2.0;

@@ -224,7 +224,7 @@ TEST(Why, WhatIsHiddenSaysNothingAndWhatHidesItIsNamed) {
   EXPECT_EQ(view.hidden_by[0].name, "board");
   EXPECT_NEAR(view.hidden_by[0].pixels, view.evidence.in_view, 0.1 * view.evidence.in_view);
   EXPECT_THAT(answer.text, HasSubstr("hidden by board"));
-  EXPECT_THAT(answer.text, HasSubstr("say nothing"));
+  EXPECT_THAT(answer.text, HasSubstr("says nothing for it or against it"));
 }
 
 TEST(Why, AMugThatIsSeenIsThereAndOneThatIsNotSeenIsNot) {
