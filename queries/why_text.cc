@@ -101,7 +101,7 @@ std::string text_of(const WhyComparison& c, const WhyAnswer& answer, const geome
         (c.deciding.size() == 1 ? " decides: " : " decide: ") + (sum > 0.0 ? "+" : "") + fixed_text(sum, 1) + " nats. ";
   }
   if (c.place && !c.place->in_image.empty())
-    text += "In the frame that says most, what says it lies " + c.place->in_image + " of it. ";
+    text += "In the frame that says most, the pixels that say it lie " + c.place->in_image + " of the object. ";
   double against = 0.0;
   for (std::size_t k = 0; k < c.frames.size(); ++k)
     against += answer.tempering[k] * (c.tempered > 0.0 ? c.frames[k].speaks_against : c.frames[k].speaks_for);
