@@ -76,6 +76,22 @@ belief::EventWeights read_events(const LocatedValue& value, Problems& problems) 
   return events;
 }
 
+RecordingRecipe read_recording(const LocatedValue& value, Problems& problems) {
+  constexpr long long kMostSeed = 1LL << 53;
+  RecordingRecipe recipe;
+  Binder binder(value, problems);
+  if (const LocatedValue* at = binder.find("seed"))
+    if (const auto seed = read_integer(*at, problems, 0, kMostSeed, "give a whole number of at least 0"))
+      recipe.seed = static_cast<std::uint64_t>(*seed);
+  binder.read("rate", recipe.rate, {0.1, 240.0, "give frames a second between 0.1 and 240"});
+  binder.read("reports_robot", recipe.reports_robot);
+  const std::vector<std::string> steppers = {"automatic", "bullet", "lockstep"};
+  if (const LocatedValue* at = binder.find("stepper"))
+    if (const auto word = read_word(*at, problems, steppers)) recipe.stepper = steppers[*word];
+  binder.read("step", recipe.step, {kStep.low, kStep.high, "give seconds between 0.00001 and 0.02", "s"});
+  return recipe;
+}
+
 void read_gravity(Binder& binder, Scene& scene) {
   const LocatedValue* at = binder.find("gravity");
   if (at) scene.gravity_W = read_vector(*at, binder.problems(), kGravity);
@@ -167,7 +183,8 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   });
   if (const LocatedValue* at = binder.find("depth_noise")) scene.depth_noise = read_depth_noise(*at, problems);
   if (const LocatedValue* at = binder.find("actions")) scene.actions = read_actions(*at, context);
-  if (const LocatedValue* at = binder.find("events")) read_events(*at, problems);  // kept by parse_event_weights
+  if (const LocatedValue* at = binder.find("events")) read_events(*at, problems);        // kept by parse_event_weights
+  if (const LocatedValue* at = binder.find("recording")) read_recording(*at, problems);  // by parse_recording_recipe
   const LocatedValue* outcomes = binder.find("outcomes");
   read_names(outcomes, problems);
   for_each_named(outcomes, problems, [&](const LocatedValue& value, const std::string& name) {
@@ -263,6 +280,16 @@ core::Result<belief::EventWeights> parse_event_weights(std::string_view text, co
     if (document.keys[i].name == "events") events = read_events(document.items[i], problems);
   if (!problems.empty()) return problems.status();
   return events;
+}
+
+core::Result<RecordingRecipe> parse_recording_recipe(std::string_view text, const std::string& file) {
+  PRESCENE_TRY(const LocatedValue document, parse_yaml(text, file, YamlLimits{}));
+  Problems problems;
+  RecordingRecipe recipe;
+  for (std::size_t i = 0; i < document.keys.size(); ++i)
+    if (document.keys[i].name == "recording") recipe = read_recording(document.items[i], problems);
+  if (!problems.empty()) return problems.status();
+  return recipe;
 }
 
 core::Result<Scene> read_scene(const std::filesystem::path& path, const SceneFileOptions& options, FileReport* report) {

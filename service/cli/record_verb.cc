@@ -6,6 +6,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/interfaces/bags/bag_writer.h"
 #include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/live/bus_recorder.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/recording/bop_dataset.h"
@@ -24,6 +25,8 @@ struct RecordOptions {
   std::vector<std::string> removals;
   std::vector<std::string> puts;
   bool unreported_robot = false;
+  std::string stepper = "automatic";
+  double step = 0.0;  // 0: the scene's
   PartLimits parts;
   SimulatedRecordingOptions simulation;
   interfaces::DdsOptions dds;
@@ -39,16 +42,28 @@ core::Status with_name(const core::Status& status, const std::filesystem::path& 
   return {status.code(), text};
 }
 
+/// What the scene's recipe says and the command line does not.
+core::Status take_recipe(const std::string& text, RecordOptions& options, VerbContext& context, std::uint64_t& seed) {
+  PRESCENE_TRY(const interfaces::RecordingRecipe recipe, interfaces::parse_recording_recipe(text, options.simulate));
+  const auto given = [&](const char* name) { return options.verb->count(name) > 0; };
+  seed = context.options().seed_given ? context.options().seed : recipe.seed.value_or(context.options().seed);
+  if (recipe.rate && !given("--rate")) options.simulation.rate = *recipe.rate;
+  if (!recipe.stepper.empty() && !given("--stepper")) options.stepper = recipe.stepper;
+  if (recipe.step && !given("--step")) options.step = *recipe.step;
+  options.simulation.reports_robot = recipe.reports_robot && !options.unreported_robot;
+  return core::ok_status();
+}
+
 /// Writes the recording `aside`, and labels where they are asked for; kCancelled with what is done in both.
 core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene& scene, const std::string& text,
-                         FilesOfScene files, const RecordOptions& options, Backends& backends, BopDataset* labels,
-                         VerbContext& context) {
+                         FilesOfScene files, const RecordOptions& options, std::uint64_t seed, Backends& backends,
+                         BopDataset* labels, VerbContext& context) {
   PRESCENE_TRY(const auto recording,
-               RecordingWriter::create(aside, {options.simulate, text, context.options().seed, "", std::move(files)}));
+               RecordingWriter::create(aside, {options.simulate, text, seed, "", std::move(files)}));
   SimulatedRecordingOptions simulation = options.simulation;
   if (labels != nullptr) simulation.on_frame = [&](const SimulatedFrame& frame) { return labels->add(frame); };
-  core::Status simulated = simulate_recording(scene, simulation, context.options().seed, backends,
-                                              context.cancellation(), context.progress("recording"), *recording);
+  core::Status simulated = simulate_recording(scene, simulation, seed, backends, context.cancellation(),
+                                              context.progress("recording"), *recording);
   const core::Status labelled = labels != nullptr ? labels->close() : core::ok_status();
   PRESCENE_RETURN_IF_ERROR(recording->close());
   return simulated.ok() ? labelled : simulated;
@@ -101,12 +116,21 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
     PRESCENE_TRY(UnannouncedChange change, put_from_text(text));
     options.simulation.changes.push_back(std::move(change));
   }
-  options.simulation.reports_robot = !options.unreported_robot;
   PRESCENE_TRY(const std::string text, read_scene_text(options.simulate));
   FilesOfScene files;
-  PRESCENE_TRY(const auto scene, load_scene_text(text, options.simulate, context.log(), &files));
+  PRESCENE_TRY(auto scene, load_scene_text(text, options.simulate, context.log(), &files));
+  std::uint64_t seed = 0;
+  PRESCENE_RETURN_IF_ERROR(take_recipe(text, options, context, seed));
+  if (options.step > 0.0) {
+    auto with_step = std::make_shared<belief::Scene>(*scene);
+    with_step->step = options.step;
+    scene = std::move(with_step);
+  }
   PRESCENE_RETURN_IF_ERROR(check_topics_once(*options.verb, *scene));
-  Backends backends(context.pool());
+  BackendSettings settings;
+  if (options.stepper == "bullet") settings.stepper = Stepper::kBullet;
+  if (options.stepper == "lockstep") settings.stepper = Stepper::kLockstep;
+  Backends backends(context.pool(), settings);
   PRESCENE_TRY(const auto renderer, backends.make_renderer());
   std::unique_ptr<BopDataset> labels;
   if (!options.labels.empty()) {
@@ -126,7 +150,8 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   const std::filesystem::path target =
       replaces ? std::filesystem::canonical(options.output, error) : std::filesystem::path(options.output);
   PRESCENE_TRY(const std::filesystem::path aside, interfaces::create_beside(target, options.output));
-  core::Status status = simulate_to(aside, *scene, text, std::move(files), options, backends, labels.get(), context);
+  core::Status status =
+      simulate_to(aside, *scene, text, std::move(files), options, seed, backends, labels.get(), context);
   const bool cancelled = status.code() == core::StatusCode::kCancelled;
   const bool keeps = status.ok() || (cancelled && !replaces);
   if (keeps) std::filesystem::rename(aside, target, error);
@@ -214,6 +239,14 @@ Verb add_record_verb(CLI::App& app) {
       ->needs("--simulate");
   verb->add_flag("--unreported-robot", options->unreported_robot,
                  "The robot moves and acts, but neither its poses nor its actions are published")
+      ->needs("--simulate");
+  verb->add_option("--stepper", options->stepper,
+                   "Who simulates what is recorded: lockstep, bullet, or automatic: lockstep where it can, else bullet")
+      ->check(one_of({"automatic", "bullet", "lockstep"}))
+      ->needs("--simulate")
+      ->capture_default_str();
+  verb->add_option("--step", options->step, "Of the simulation that is recorded, s; default: the scene's")
+      ->check(number_between(1e-5, 0.02))
       ->needs("--simulate");
   add_part_options(*verb, options->parts);
   for (const char* name : {"--part-seconds", "--part-megabytes", "--keep-megabytes"})

@@ -17,6 +17,7 @@
 #include "prescene/service/outside_json.h"
 #include "prescene/service/recording/explained_again.h"
 #include "prescene/service/recording/foreseen.h"
+#include "prescene/service/recording/happened.h"
 #include "prescene/service/recording/replay_input.h"
 #include "prescene/service/recording/session_report.h"
 #include "prescene/service/recording/support_score.h"
@@ -305,6 +306,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
     return core::ok_status();
   };
   DamagedRecords damaged;
+  std::optional<HappenedRecord> happened;
   const JsonSink on_json = [&](const std::string& topic, const std::string& json,
                                core::TimeNs time_ns) -> core::Status {
     if (topic == kAnswerTopic) return explained.add_answer(json, time_ns);
@@ -316,6 +318,11 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
         damaged.add(truth.status());
     } else if (topic == kOutcomeTopic) {
       if (const auto outcomes = outcome_record_from_json(json); !outcomes) damaged.add(outcomes.status());
+    } else if (topic == kHappenedTopic) {
+      if (auto record = happened_from_json(json))
+        happened = *std::move(record);
+      else
+        damaged.add(record.status());
     }
     return core::ok_status();
   };
@@ -363,6 +370,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
        {"objects", states.json()},
        {"tracking", tracking_json(rows)},
        {"supports", support_rows},
+       {"happened", happened ? to_json(*happened) : ordered_json()},
        {"timeline", timeline.json()},
        {"steps", steps}},
       std::to_string(summary->steps) + " steps from " + std::to_string(summary->messages) + " messages, " +
@@ -375,8 +383,8 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
                ? std::to_string(explained.compared() - explained.different()) + " of " +
                      std::to_string(explained.compared()) + " recorded explanations have the recorded bits\n"
                : "") +
-          states.text() + tracking_text(rows) + supports_text(supports.rows()) + timeline.text() +
-          warnings_text(*summary));
+          states.text() + tracking_text(rows) + supports_text(supports.rows()) +
+          (happened ? happened_text(*happened) : "") + timeline.text() + warnings_text(*summary));
   if (summary->cancelled) return core::cancelled("stopped on request; what was done is printed");
   if (summary->different > 0) {
     return core::unavailable("step " + std::to_string(*summary->first_different_step) +

@@ -15,12 +15,17 @@
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/recording/foreseen.h"
+#include "prescene/service/recording/happened.h"
 #include "prescene/service/tracking/camera_frames.h"
 
 namespace prescene::service {
 namespace {
 
 using nlohmann::ordered_json;
+
+// Of what happened, motion is looked at more often than the cameras do, as long as that takes little memory.
+constexpr double kFinest = 1.0 / 240.0;  // s
+constexpr double kMostFineStates = 2e4;  // some 3 kB each where there are 16 objects
 
 bool is_transparent(const rendering::RenderInstance& instance) {
   return instance.material.behind > rendering::SurfaceMaterial::opaque().behind;
@@ -145,6 +150,11 @@ class Player {
                              : core::ok_status();
   }
 
+  core::Status write_happened(const HappenedRecord& record, double end) {
+    return recording_.write_json(kHappenedTopic, belief::json_text(to_json(record)),
+                                 stamp(end) + core::ns_of(options_.latency));
+  }
+
   core::Status write_outcomes(const belief::Trajectory& trajectory) {
     if (scene_.outcomes.empty() && scene_.exclusive_outcomes.empty()) return core::ok_status();
     return recording_.write_json(kOutcomeTopic,
@@ -210,6 +220,24 @@ class Player {
   std::vector<Taker> cameras_;
 };
 
+/// What happened in the scene that was played every `interval` s, by looking at it more closely.
+core::Result<HappenedRecord> look_closely(const belief::Scene& scene, const SimulatedRecordingOptions& options,
+                                          double interval, std::uint64_t seed, Backends& backends) {
+  const double most = std::max(1.0, kMostFineStates * interval / scene.duration);
+  const double finer = std::clamp(std::round(interval / kFinest), 1.0, std::floor(most));
+  std::vector<UnannouncedChange> changes = options.changes;
+  for (UnannouncedChange& change : changes) change.time = std::round(change.time / interval) * interval;
+  PRESCENE_TRY(const std::vector<PlayedPart> parts,
+               play_scene(scene, changes, backends.simulator_factory(), interval / finer, seed, backends.pool()));
+  PRESCENE_TRY(const auto simulator, backends.make_simulator(scene));
+  HappenedRecord record = happened_in(scene, changes, parts, options.reports_robot);
+  record.first_ns = options.start_ns;
+  record.stepper = simulator->stepper().name;
+  record.step = simulator->step_size();
+  record.resolution = interval / finer;
+  return record;
+}
+
 }  // namespace
 
 std::string camera_frame_of(const belief::Scene& scene, int camera) {
@@ -266,6 +294,8 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
     PRESCENE_RETURN_IF_ERROR(due[i].write());
     if (progress) progress({static_cast<double>(i + 1) / static_cast<double>(due.size()), {}, ""});
   }
+  PRESCENE_TRY(const HappenedRecord happened, look_closely(scene, options, interval, seed, backends));
+  PRESCENE_RETURN_IF_ERROR(player.write_happened(happened, end));
   return options.changes.empty() ? player.write_outcomes(parts.back().trajectory) : core::ok_status();
 }
 

@@ -118,7 +118,7 @@ interfaces::TopicQos offered_as(const std::string& topic, const std::string& typ
 }
 
 bool is_parsed_in_recordings(const std::string& topic) {
-  return topic == kStepTopic || topic == kTruthTopic || topic == kOutcomeTopic;
+  return topic == kStepTopic || topic == kTruthTopic || topic == kOutcomeTopic || topic == kHappenedTopic;
 }
 
 std::size_t most_json_bytes(const std::string& topic) {

@@ -57,6 +57,9 @@ extern const FrameHistory history;
 extern const belief::WhyQuestion question;
 extern const queries::ExplainContext context;
 }  // namespace why_answer_h
+namespace happened_h {
+extern const std::string text;
+}  // namespace happened_h
 
 namespace explained_again_h {
 extern const ReplayInput input;

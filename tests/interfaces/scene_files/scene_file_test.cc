@@ -498,6 +498,30 @@ TEST(SceneFile, WarnsOfOdditiesButReads) {
   EXPECT_THAT(report.warnings[0].text(), HasSubstr("no support"));
 }
 
+TEST(RecordingRecipe, SaysHowASimulatedRecordingIsMade) {
+  const std::string scene = "models:\n  m: {sphere: 0.1, mass: 1}\nobjects:\n  o: {model: m, pose: {}}\n";
+  const auto silent = parse_recording_recipe(scene, "s.yaml");
+  ASSERT_TRUE(silent.ok()) << silent.status().message();
+  EXPECT_FALSE(silent->seed || silent->rate || silent->step);
+  EXPECT_TRUE(silent->reports_robot);
+  const std::string with =
+      scene + "recording: {seed: 4, rate: 10, reports_robot: false, stepper: bullet, step: 0.001}\n";
+  ASSERT_TRUE(parse_scene(with, "s.yaml").ok());
+  const auto recipe = parse_recording_recipe(with, "s.yaml");
+  ASSERT_TRUE(recipe.ok()) << recipe.status().message();
+  EXPECT_EQ(recipe->seed, 4u);
+  EXPECT_EQ(recipe->rate, 10.0);
+  EXPECT_FALSE(recipe->reports_robot);
+  EXPECT_EQ(recipe->stepper, "bullet");
+  EXPECT_EQ(recipe->step, 0.001);
+  for (const char* wrong : {"{seeds: 4}", "{seed: -1}", "{rate: 0}", "{stepper: bulet}", "{step: 1}", "[1]"}) {
+    const auto refused = parse_scene(scene + "recording: " + wrong + "\n", "s.yaml");
+    EXPECT_FALSE(refused.ok()) << wrong;
+    EXPECT_THAT(refused.status().message(), HasSubstr("recording")) << wrong;
+    EXPECT_FALSE(parse_recording_recipe(scene + "recording: " + wrong + "\n", "s.yaml").ok()) << wrong;
+  }
+}
+
 TEST(ReadScene, SaysThatAFileIsMissing) {
   FileReport report;
   const auto scene = read_scene("/nowhere/scene.yaml", {}, &report);

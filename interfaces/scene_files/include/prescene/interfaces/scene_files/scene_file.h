@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -68,5 +69,17 @@ core::Result<belief::Scene> parse_scene(std::string_view text, const std::string
 /// How probable the scene holds events to be (its key `events`), those that it does not name at their defaults. The
 /// status of a failure is that of parse_scene for this key alone.
 core::Result<belief::EventWeights> parse_event_weights(std::string_view text, const std::string& file);
+
+/// How a simulated recording of the scene is made, where nobody says otherwise (its key `recording`).
+struct RecordingRecipe {
+  std::optional<std::uint64_t> seed;
+  std::optional<double> rate;  ///< Frames a second of each camera.
+  bool reports_robot = true;   ///< Else neither the robot's poses nor its actions are published.
+  std::string stepper;         ///< "automatic", "bullet" or "lockstep"; "" = not said.
+  std::optional<double> step;  ///< s, of the simulation that is recorded alone.
+};
+/// Of a scene without the key, one that says nothing. The status of a failure is that of parse_scene for this key
+/// alone.
+core::Result<RecordingRecipe> parse_recording_recipe(std::string_view text, const std::string& file);
 
 }  // namespace prescene::interfaces

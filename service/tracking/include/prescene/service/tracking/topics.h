@@ -69,9 +69,10 @@ std::string pose_topic(const std::string& object);
 // In recordings only, as JSON.
 /// What was set while the service ran (running_settings_text()), where it came between the robot's messages.
 inline constexpr const char* kSettingsTopic = "/prescene/settings";
-inline constexpr const char* kTruthTopic = "/prescene/truth";      ///< Simulated truth of each frame.
-inline constexpr const char* kOutcomeTopic = "/prescene/outcome";  ///< What the simulation came to.
-inline constexpr const char* kStepTopic = "/prescene/step";        ///< One step record a belief step.
+inline constexpr const char* kTruthTopic = "/prescene/truth";        ///< Simulated truth of each frame.
+inline constexpr const char* kOutcomeTopic = "/prescene/outcome";    ///< What the simulation came to.
+inline constexpr const char* kHappenedTopic = "/prescene/happened";  ///< What truly happened in it, and when.
+inline constexpr const char* kStepTopic = "/prescene/step";          ///< One step record a belief step.
 
 /// A topic as it is on the bus.
 struct BusTopic {
