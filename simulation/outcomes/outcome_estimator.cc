@@ -292,11 +292,18 @@ class Looks {
   Looks(const StartDistribution& starts, std::span<const Variable> variables, const EstimatorOptions& options)
       : starts_(starts), variables_(variables), options_(options) {}
 
-  /// Instances before the first look, and whether each component has some of them then.
-  static constexpr std::size_t kFirst = 32;
-  bool wants_first(const OutcomeEstimate& estimate) const {
+  /// Instances after which there is a look before the net has grown; more than `done`, at most `target`. Of two threads
+  /// each fills one vector of eight lanes with the first: fewer instances hardly take less time.
+  std::size_t end_of_chunks(std::size_t done, std::size_t target) const {
+    for (const std::size_t count : kEarly)
+      if (options_.on_look && done < count) return std::min(count, target);
+    return target;
+  }
+  /// Whether that is now, and each component has some of them.
+  bool wants_early(const OutcomeEstimate& estimate) const {
     constexpr int kFewest = 4;  // of a component: fewer say nothing of how it scatters
-    if (!options_.on_look || estimate.certain || estimate.instances.size() != kFirst) return false;
+    if (!options_.on_look || estimate.certain) return false;
+    if (std::ranges::find(kEarly, estimate.instances.size()) == std::end(kEarly)) return false;
     std::vector<int> counts(starts_.components.size(), 0);
     for (const InstanceRecord& record : estimate.instances) ++counts[static_cast<std::size_t>(record.component)];
     return std::all_of(counts.begin(), counts.end(), [](int count) { return count >= kFewest; });
@@ -305,8 +312,7 @@ class Looks {
   /// Of an estimate that was weighed; it is as before when this returns.
   void tell(OutcomeEstimate& estimate, double wall_seconds) {
     if (!options_.on_look || estimate.certain || estimate.instances.empty()) return;
-    const double look = ++looks_;
-    const double error = (1.0 - options_.confidence) / (look * (look + 1.0));
+    const double error = (1.0 - options_.confidence) * next_share(estimate.instances.size());
     std::vector<VariableEstimate> own = std::move(estimate.variables);
     const bool converged = estimate.converged;
     evaluate(starts_, variables_, look_estimate, 1.0 - error, options_.tolerance, estimate);
@@ -317,10 +323,22 @@ class Looks {
   }
 
  private:
+  static constexpr std::size_t kEarly[] = {16, 32};
+  // Of the tolerated error, for the first of these. It comes out wide whatever its share; this one widens later looks
+  // by 2 %.
+  static constexpr double kShareOfFirst = 0.125;
+
+  /// Of the tolerated error; those of all looks that there may be sum to one.
+  double next_share(std::size_t instances) {
+    if (instances == kEarly[0]) return kShareOfFirst;
+    const double look = ++looks_;
+    return (1.0 - kShareOfFirst) / (look * (look + 1.0));
+  }
+
   const StartDistribution& starts_;
   std::span<const Variable> variables_;
   const EstimatorOptions& options_;
-  int looks_ = 0;
+  int looks_ = 0;  // but for the first of kEarly
 };
 
 double widest_half(const OutcomeEstimate& estimate) {
@@ -418,8 +436,8 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
     const std::size_t target = std::min(limit, plan.order().size());
     while (!stop && estimate.instances.size() < target) {
       const std::size_t done = estimate.instances.size();
-      // Of whatever size chunks are, the first look is at the same instances.
-      const std::size_t end = options.on_look && done < Looks::kFirst ? std::min(Looks::kFirst, target) : target;
+      // Of whatever size chunks are, looks are at the same instances.
+      const std::size_t end = looks.end_of_chunks(done, target);
       const auto planned = std::span(plan.order()).subspan(done, std::min(chunk, end - done));
       const double begun = watch.seconds();
       if (!run_chunk(runner, planned, estimate.instances, trail) || (cancellation && cancellation->requested()))
@@ -428,8 +446,8 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
         stop = EstimateStop::kTimeLimit;
       if (watch.seconds() - begun < kShortChunk) chunk = std::min(2 * chunk, most_at_once);
       forecast.report(static_cast<double>(estimate.instances.size()));
-      if (!stop && looks.wants_first(estimate) && !trail.fails(Looks::kFirst, options.tolerated_mismatch)) {
-        estimate.certificates = trail.use_of(Looks::kFirst);
+      if (!stop && looks.wants_early(estimate) && !trail.fails(estimate.instances.size(), options.tolerated_mismatch)) {
+        estimate.certificates = trail.use_of(estimate.instances.size());
         weigh(starts, estimate);
         looks.tell(estimate, watch.seconds());
       }

@@ -161,7 +161,7 @@ TEST_F(QueryStream, TheAnswerIsTheSameButForSayingThatItIsFinal) {
       EXPECT_EQ(streamed[i].at("id"), "q");
       EXPECT_EQ(streamed[i].at("predict").at("stopped"), "");
     }
-    EXPECT_EQ(streamed.front().at("predict").at("instances"), 32);
+    EXPECT_EQ(streamed.front().at("predict").at("instances"), 16);
   }
 }
 

@@ -18,11 +18,11 @@
 //   OutcomeEstimate estimate = estimate_outcomes(simulator, starts, variables, request, stream, options, pool);
 //   ... estimate.variables[0].classes[0].probability
 //
-// With EstimatorOptions::on_look, what is known is told while the work goes on: after the first 32 instances and at
-// each growth of the net. Whoever looks at a class again and again, and stops when they like what they see, is not
-// deceived: the k-th look has the share 1 / (k (k + 1)) of the tolerated error, so that the intervals of all looks at a
-// class hold together with the wanted confidence (Bonferroni's inequality). This is true of each class by itself, not
-// of all classes together. The intervals (look_estimate) are wider than the estimate's, as errors so small take tails
+// With EstimatorOptions::on_look, what is known is told while the work goes on: after the first 16 and 32 instances and
+// at each growth of the net. Whoever looks at a class again and again, and stops when they like what they see, is not
+// deceived: the look at 16 instances has 1/8 of the tolerated error, and of those after it the k-th has the share
+// 7/8 / (k (k + 1)), so that the intervals of all looks at a class hold together with the wanted confidence
+// (Bonferroni's inequality). This is true of each class by itself, not of all classes together. The intervals (look_estimate) are wider than the estimate's, as errors so small take tails
 // that are exact.
 #pragma once
 
