@@ -446,7 +446,9 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
         stop = EstimateStop::kTimeLimit;
       if (watch.seconds() - begun < kShortChunk) chunk = std::min(2 * chunk, most_at_once);
       forecast.report(static_cast<double>(estimate.instances.size()));
-      if (!stop && looks.wants_early(estimate) && !trail.fails(estimate.instances.size(), options.tolerated_mismatch)) {
+      // What is known of the whole net is told below.
+      if (!stop && estimate.instances.size() < target && looks.wants_early(estimate) &&
+          !trail.fails(estimate.instances.size(), options.tolerated_mismatch)) {
         estimate.certificates = trail.use_of(estimate.instances.size());
         weigh(starts, estimate);
         looks.tell(estimate, watch.seconds());

@@ -22,8 +22,8 @@
 // at each growth of the net. Whoever looks at a class again and again, and stops when they like what they see, is not
 // deceived: the look at 16 instances has 1/8 of the tolerated error, and of those after it the k-th has the share
 // 7/8 / (k (k + 1)), so that the intervals of all looks at a class hold together with the wanted confidence
-// (Bonferroni's inequality). This is true of each class by itself, not of all classes together. The intervals (look_estimate) are wider than the estimate's, as errors so small take tails
-// that are exact.
+// (Bonferroni's inequality). This is true of each class by itself, not of all classes together. The intervals
+// (look_estimate) are wider than the estimate's, as errors so small take tails that are exact.
 #pragma once
 
 #include <functional>
