@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "own_action.h"
 #include "prescene/core/check.h"
 #include "prescene/core/spelling.h"
 #include "prescene/core/text.h"
@@ -15,6 +16,15 @@ namespace {
 
 using belief::ActionParameter;
 
+/// "placed", "poured out".
+std::string done_with(const std::string& action) {
+  if (action == "place") return "placed";
+  if (action == "release") return "released";
+  if (action == "pour") return "poured out";
+  if (action == "tilt") return "tilted";
+  return action == "insert" ? "inserted" : "carried";
+}
+
 /// The object that the action is about, in the prior's scene.
 core::Result<std::size_t> object_of(const Prior& prior, const belief::AchieveQuery& query,
                                     const belief::ActionSchema& schema, const belief::Outcome& wanted) {
@@ -23,20 +33,20 @@ core::Result<std::size_t> object_of(const Prior& prior, const belief::AchieveQue
   for (const belief::SceneObject& object : scene.objects)
     if (object.held_by) held.push_back(object.name);
   std::string name = query.object;
+  if (name.empty() && schema.of_scene) name = object_of_own(scene, schema.name);
   if (name.empty() && schema.of_held && held.size() == 1) name = held.front();
   if (name.empty() && schema.of_held && held.empty())
-    return core::invalid_input("nothing is held by a robot body, so nothing can be " +
-                               std::string(schema.name == "place" ? "placed" : "released") +
+    return core::invalid_input("nothing is held by a robot body, so nothing can be " + done_with(schema.name) +
                                ": grasp an object first (in a scene file: held_by)");
   if (name.empty() && schema.of_held)
     return core::invalid_input("several objects are held: name the one to " + schema.name + " (object)");
   if (name.empty()) name = wanted.object;
   const std::optional<int> index = belief::find_object(scene, name);
   if (!index) return no_such_object(prior, name);
-  if (schema.of_held && !scene.objects[static_cast<std::size_t>(*index)].held_by)
-    return core::invalid_input("'" + name + "' is not held by a robot body, so it can't be " +
-                               (schema.name == "place" ? "placed" : "released") + ": name an object that is held" +
-                               (held.empty() ? "" : ", like " + held.front()));
+  const bool in_scene = schema.of_scene && own_action(scene, schema.name, name);
+  if (schema.of_held && !in_scene && !scene.objects[static_cast<std::size_t>(*index)].held_by)
+    return core::invalid_input("'" + name + "' is not held by a robot body, so it can't be " + done_with(schema.name) +
+                               ": name an object that is held" + (held.empty() ? "" : ", like " + held.front()));
   return static_cast<std::size_t>(*index);
 }
 
@@ -103,10 +113,11 @@ core::Result<std::unique_ptr<PlannedAction>> plan_action(const Prior& prior, con
 
   std::vector<SceneValue> scene_values;
   core::Result<std::unique_ptr<PlannedAction>> plan =
-      schema->name == "place"  ? plan_place(prior, query, wanted, index, pool, scene_values)
-      : schema->name == "push" ? plan_push(prior, query, index, pool, scene_values)
-      : schema->name == "bump" ? plan_bump(prior, query, index, scene_values)
-                               : plan_release(prior, query, index, scene_values);
+      schema->of_scene          ? plan_own_action(prior, query, schema->name, index, scene_values)
+      : schema->name == "place" ? plan_place(prior, query, wanted, index, pool, scene_values)
+      : schema->name == "push"  ? plan_push(prior, query, index, pool, scene_values)
+      : schema->name == "bump"  ? plan_bump(prior, query, index, scene_values)
+                                : plan_release(prior, query, index, scene_values);
   if (!plan) return plan;
   PlannedAction& made = **plan;
   made.object_ = prior.scene->objects[index].name;
@@ -119,8 +130,9 @@ core::Result<std::unique_ptr<PlannedAction>> plan_action(const Prior& prior, con
     FreeParameter& one = made.free_.emplace_back();
     one.schema = *parameter;
     const SceneValue* known = of_scene(parameter->name);
-    one.low = range.low.value_or(known ? known->low : parameter->low.value_or(parameter->least));
-    one.high = range.high.value_or(known ? known->high : parameter->high.value_or(parameter->most));
+    const auto within = [&, bounds = parameter](double end) { return std::clamp(end, bounds->least, bounds->most); };
+    one.low = range.low.value_or(known ? within(known->low) : parameter->low.value_or(parameter->least));
+    one.high = range.high.value_or(known ? within(known->high) : parameter->high.value_or(parameter->most));
     PRESCENE_RETURN_IF_ERROR(check_within(*parameter, one.low, "free." + range.name));
     PRESCENE_RETURN_IF_ERROR(check_within(*parameter, one.high, "free." + range.name));
     if (!(one.low < one.high))

@@ -132,7 +132,7 @@ void add_achieve_options(CLI::App& verb, AchieveOptions& options) {
   verb.add_option("--rotation-error", options.rotation_error,
                   "The same of how it is turned, degrees about each of its axes")
       ->check(number_between(0.0, 180.0));
-  verb.add_option("--delay", options.delay, "Of a release or push: how late it begins, s; the mean")
+  verb.add_option("--delay", options.delay, "Of all but a place: how late it begins, s; the mean")
       ->check(number_between(0.0, 3600.0));
   verb.add_option("--delay-error", options.delay_error, "Standard deviation of the delay, s")
       ->check(number_between(0.0, 3600.0));

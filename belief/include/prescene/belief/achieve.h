@@ -43,7 +43,7 @@ struct AchieveQuery {
   std::string outcome;
   std::optional<Outcome> wanted;
   std::string action = "place";       ///< A name of action_schemas().
-  std::string object;                 ///< Empty: the one that is held.
+  std::string object;                 ///< Empty: that of the own action, the one that is held, or the outcome's.
   std::string support;                ///< Of place. Empty: the one that the outcome names.
   std::vector<ParameterRange> free;   ///< At least one.
   std::vector<ParameterValue> fixed;  ///< The others: those not named have their schema's or the scene's values.
@@ -60,7 +60,7 @@ struct AchieveQuery {
 struct ActionChoice {
   std::vector<double> values;     ///< In the order of AchieveAnswer::parameters.
   std::vector<double> low, high;  ///< Of a neighbourhood: each parameter may be anywhere between. Empty: just `values`.
-  std::optional<Pose> X_WO;       ///< Of place: where the object is let go.
+  std::optional<Pose> X_WO;       ///< Of place: where the object is let go; of pour and insert: where it is brought.
   std::optional<Action> action;   ///< The same as an action of a prediction.
   double probability = 0.0;       ///< Share of `instances` with the outcome.
   double lower = 0.0, upper = 1.0;  ///< Its interval of the wanted confidence.
@@ -72,7 +72,7 @@ struct ActionChoice {
 /// A choice that looks good so far. As it was chosen for that, it is probably not quite as good: there is no interval.
 struct ActionCandidate {
   std::vector<double> values;  ///< In the order of AchieveAnswer::parameters.
-  std::optional<Pose> X_WO;    ///< Of place: where the object is let go.
+  std::optional<Pose> X_WO;    ///< As in ActionChoice.
   double expected = 0.0;       ///< Probability of the outcome, guessed from its instances and those of its neighbours.
   int instances = 0;           ///< Of its own.
   friend bool operator==(const ActionCandidate&, const ActionCandidate&) = default;

@@ -16,7 +16,7 @@ namespace prescene::belief {
 /// A number that an action takes.
 struct ActionParameter {
   std::string name;  ///< With "_deg" at its end where it is in degrees; it may be left out where it is named.
-  std::string unit;  ///< "m", "deg", "s", "m/s" or "N s".
+  std::string unit;  ///< "m", "deg", "s", "m/s", "N", "N m" or "N s".
   double least = 0.0, most = 0.0;  ///< What makes sense at all.
   /// Where it is not given; nothing: the scene gives it.
   std::optional<double> value;
@@ -27,18 +27,27 @@ struct ActionParameter {
   bool is_angle() const { return unit == "deg"; }
 };
 
+/// What one might think to search, and why that can't be.
+struct NotSearched {
+  std::string name;
+  std::string reason;
+};
+
 struct ActionSchema {
   std::string name;
   std::string meaning;
-  bool of_held = false;  ///< The object has to be held.
+  bool of_held = false;  ///< The object has to be held when it begins.
   std::vector<ActionParameter> parameters;
+  /// It stands in for the scene's own action of this kind; what is neither free nor given is as there.
+  bool of_scene = false;
+  std::vector<NotSearched> not_searched = {};
 };
 
-/// "place", "push", "bump" and "release".
+/// "place", "push", "bump", "release", "tilt", "pour", "insert", "grasp", "pull", "move_joint" and "transport".
 const std::vector<ActionSchema>& action_schemas();
 /// kNotFound with the nearest name.
 core::Result<const ActionSchema*> find_action_schema(const std::string& name);
-/// kNotFound with the nearest name.
+/// kNotFound with the nearest name; kInvalidInput with the reason of what is not searched.
 core::Result<const ActionParameter*> find_action_parameter(const ActionSchema& schema, const std::string& name);
 
 }  // namespace prescene::belief
