@@ -49,6 +49,7 @@ prescene_outside(embree embree 3)
 prescene_outside(ODE::ode ODE)
 prescene_outside(MuJoCo::mujoco MuJoCo)
 prescene_outside(fastrtps fastrtps)
+prescene_outside(OMPL::ompl OMPL)
 
 # prescene_package_of(<target> <result>): the arguments of find_package for an outside library.
 function(prescene_package_of target result)
