@@ -14,6 +14,8 @@
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/parameter_messages.h"
 #include "prescene/interfaces/ros_messages/planning_messages.h"
+#include "prescene/interfaces/ros_messages/prescene_messages.h"
+#include "prescene_msgs.h"
 #include "ros_messages.h"
 
 namespace prescene::interfaces {
@@ -55,7 +57,9 @@ void fill(Sequence& to, const std::vector<T>& from, SampleArena& arena);
 #define PRESCENE_FILL_9(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_8(__VA_ARGS__)
 #define PRESCENE_FILL_10(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_9(__VA_ARGS__)
 #define PRESCENE_FILL_11(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_10(__VA_ARGS__)
+#define PRESCENE_FILL_12(a, ...) PRESCENE_FILL_FIELD(a) PRESCENE_FILL_11(__VA_ARGS__)
 #define PRESCENE_FILL_13(a, b, ...) PRESCENE_FILL_2(a, b) PRESCENE_FILL_11(__VA_ARGS__)
+#define PRESCENE_FILL_16(a, b, c, d, e, ...) PRESCENE_FILL_5(a, b, c, d, e) PRESCENE_FILL_11(__VA_ARGS__)
 #define PRESCENE_FILL_19(a, b, c, d, e, f, g, h, ...) \
   PRESCENE_FILL_8(a, b, c, d, e, f, g, h) PRESCENE_FILL_11(__VA_ARGS__)
 /// Fills every field of the C struct from the field of the same name.
@@ -78,6 +82,7 @@ PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__PoseArray_, RosPoseArray, 2, header,
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__Transform_, RosTransform, 2, translation, rotation)
 PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__TransformStamped_, RosTransformStamped, 3, header, child_frame_id,
                      transform)
+PRESCENE_FILL_STRUCT(geometry_msgs_msg_dds__Twist_, RosTwist, 2, linear, angular)
 PRESCENE_FILL_STRUCT(tf2_msgs_msg_dds__TFMessage_, RosTfMessage, 1, transforms)
 PRESCENE_FILL_STRUCT(sensor_msgs_msg_dds__Image_, RosImage, 7, header, height, width, encoding, is_bigendian, step,
                      data)
@@ -127,6 +132,25 @@ PRESCENE_FILL_STRUCT(object_recognition_msgs_msg_dds__ObjectType_, RosObjectType
 PRESCENE_FILL_STRUCT(moveit_msgs_msg_dds__CollisionObject_, RosCollisionObject, 13, header, pose, id, type, primitives,
                      primitive_poses, meshes, mesh_poses, planes, plane_poses, subframe_names, subframe_poses,
                      operation)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__AlternativePose_, RosAlternativePose, 2, pose, probability)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__ParameterEstimate_, RosParameterEstimate, 5, name, mean, standard_deviation,
+                     low, high)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__ObjectBelief_, RosObjectBelief, 16, name, model, state, motion, held_by,
+                     confidence, existence, visible_share, pose, twist, parameters, lessons, learned, alternatives,
+                     is_new, size)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__JointBelief_, RosJointBelief, 8, name, type, position, standard_deviation,
+                     velocity, lower, upper, confidence)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__Belief_, RosBelief, 4, header, step, objects, joints)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__Event_, RosEvent, 9, header, step, event, object, support, camera, previous,
+                     current, reason)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__Query_, RosQuery, 8, id, kind, object, duration, max_seconds, stream,
+                     detail, arguments)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__Cancel_, RosCancel, 2, question, id)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__Estimate_, RosEstimate, 7, name, group, subject, other, probability, low,
+                     high)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__Answer_, RosAnswer, 12, id, step, kind, state, error, code, estimates,
+                     objects, instances, converged, remarks, json)
+PRESCENE_FILL_STRUCT(prescene_msgs_msg_dds__Progress_, RosProgress, 4, id, fraction, text, seconds_left)
 // Of replies, all but the client and the number of its request.
 PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__ListParameters_Response_, RosListParametersResponse, 1, result)
 PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__GetParameters_Response_, RosGetParametersResponse, 1, values)
@@ -139,7 +163,9 @@ PRESCENE_FILL_STRUCT(rcl_interfaces_srv_dds__SetParametersAtomically_Response_, 
 
 #undef PRESCENE_FILL_STRUCT
 #undef PRESCENE_FILL_19
+#undef PRESCENE_FILL_16
 #undef PRESCENE_FILL_13
+#undef PRESCENE_FILL_12
 #undef PRESCENE_FILL_11
 #undef PRESCENE_FILL_10
 #undef PRESCENE_FILL_9

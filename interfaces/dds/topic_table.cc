@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "prescene/interfaces/ros_messages/schemas.h"
+#include "prescene_msgs.h"
 #include "ros_messages.h"
 
 namespace prescene::interfaces {
@@ -30,6 +31,12 @@ const dds_topic_descriptor_t* descriptor_of(const std::string& ros_type) {
       {"visualization_msgs/msg/MarkerArray", &visualization_msgs_msg_dds__MarkerArray__desc},
       {"diagnostic_msgs/msg/DiagnosticArray", &diagnostic_msgs_msg_dds__DiagnosticArray__desc},
       {"moveit_msgs/msg/CollisionObject", &moveit_msgs_msg_dds__CollisionObject__desc},
+      {"prescene_msgs/msg/Belief", &prescene_msgs_msg_dds__Belief__desc},
+      {"prescene_msgs/msg/Event", &prescene_msgs_msg_dds__Event__desc},
+      {"prescene_msgs/msg/Query", &prescene_msgs_msg_dds__Query__desc},
+      {"prescene_msgs/msg/Cancel", &prescene_msgs_msg_dds__Cancel__desc},
+      {"prescene_msgs/msg/Answer", &prescene_msgs_msg_dds__Answer__desc},
+      {"prescene_msgs/msg/Progress", &prescene_msgs_msg_dds__Progress__desc},
       {"rcl_interfaces/msg/ParameterEvent", &rcl_interfaces_msg_dds__ParameterEvent__desc},
   };
   const auto* row = std::find_if(std::begin(kRows), std::end(kRows), [&](const Row& r) { return r.type == ros_type; });

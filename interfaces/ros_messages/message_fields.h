@@ -13,6 +13,7 @@
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/parameter_messages.h"
 #include "prescene/interfaces/ros_messages/planning_messages.h"
+#include "prescene/interfaces/ros_messages/prescene_messages.h"
 
 namespace prescene::interfaces::message_fields {
 
@@ -142,6 +143,36 @@ PRESCENE_FIELDS(RosCollisionObject, Field{"header", &M::header}, Field{"pose", &
                 Field{"mesh_poses", &M::mesh_poses}, Field{"planes", &M::planes}, Field{"plane_poses", &M::plane_poses},
                 Field{"subframe_names", &M::subframe_names}, Field{"subframe_poses", &M::subframe_poses},
                 Field{"operation", &M::operation});
+PRESCENE_FIELDS(RosAlternativePose, Field{"pose", &M::pose}, Field{"probability", &M::probability});
+PRESCENE_FIELDS(RosParameterEstimate, Field{"name", &M::name}, Field{"mean", &M::mean},
+                Field{"standard_deviation", &M::standard_deviation}, Field{"low", &M::low}, Field{"high", &M::high});
+PRESCENE_FIELDS(RosObjectBelief, Field{"name", &M::name}, Field{"model", &M::model}, Field{"state", &M::state},
+                Field{"motion", &M::motion}, Field{"held_by", &M::held_by}, Field{"confidence", &M::confidence},
+                Field{"existence", &M::existence}, Field{"visible_share", &M::visible_share}, Field{"pose", &M::pose},
+                Field{"twist", &M::twist}, Field{"parameters", &M::parameters}, Field{"lessons", &M::lessons},
+                Field{"learned", &M::learned}, Field{"alternatives", &M::alternatives}, Field{"is_new", &M::is_new},
+                Field{"size", &M::size});
+PRESCENE_FIELDS(RosJointBelief, Field{"name", &M::name}, Field{"type", &M::type}, Field{"position", &M::position},
+                Field{"standard_deviation", &M::standard_deviation}, Field{"velocity", &M::velocity},
+                Field{"lower", &M::lower}, Field{"upper", &M::upper}, Field{"confidence", &M::confidence});
+PRESCENE_FIELDS(RosBelief, Field{"header", &M::header}, Field{"step", &M::step}, Field{"objects", &M::objects},
+                Field{"joints", &M::joints});
+PRESCENE_FIELDS(RosEvent, Field{"header", &M::header}, Field{"step", &M::step}, Field{"event", &M::event},
+                Field{"object", &M::object}, Field{"support", &M::support}, Field{"camera", &M::camera},
+                Field{"previous", &M::previous}, Field{"current", &M::current}, Field{"reason", &M::reason});
+PRESCENE_FIELDS(RosQuery, Field{"id", &M::id}, Field{"kind", &M::kind}, Field{"object", &M::object},
+                Field{"duration", &M::duration}, Field{"max_seconds", &M::max_seconds}, Field{"stream", &M::stream},
+                Field{"detail", &M::detail}, Field{"arguments", &M::arguments});
+PRESCENE_FIELDS(RosCancel, Field{"question", &M::question}, Field{"id", &M::id});
+PRESCENE_FIELDS(RosEstimate, Field{"name", &M::name}, Field{"group", &M::group}, Field{"subject", &M::subject},
+                Field{"other", &M::other}, Field{"probability", &M::probability}, Field{"low", &M::low},
+                Field{"high", &M::high});
+PRESCENE_FIELDS(RosAnswer, Field{"id", &M::id}, Field{"step", &M::step}, Field{"kind", &M::kind},
+                Field{"state", &M::state}, Field{"error", &M::error}, Field{"code", &M::code},
+                Field{"estimates", &M::estimates}, Field{"objects", &M::objects}, Field{"instances", &M::instances},
+                Field{"converged", &M::converged}, Field{"remarks", &M::remarks}, Field{"json", &M::json});
+PRESCENE_FIELDS(RosProgress, Field{"id", &M::id}, Field{"fraction", &M::fraction}, Field{"text", &M::text},
+                Field{"seconds_left", &M::seconds_left});
 
 #undef PRESCENE_FIELDS
 
@@ -174,7 +205,8 @@ struct MinWireSize<std::array<T, n>> {
 
 }  // namespace prescene::interfaces::message_fields
 
-/// Every message of messages.h, parameter_messages.h and planning_messages.h, for explicit instantiation.
+/// Every message of messages.h, parameter_messages.h, planning_messages.h and prescene_messages.h, for explicit
+/// instantiation.
 // clang-format off
 #define PRESCENE_FOR_EACH_MESSAGE(DO) \
   DO(RosTime) DO(RosDuration) DO(RosClock) DO(RosHeader) DO(RosString) DO(RosColorRgba) DO(RosVector3) \
@@ -191,5 +223,7 @@ struct MinWireSize<std::array<T, n>> {
   DO(RosListParametersRequest) DO(RosListParametersResponse) DO(RosSetParametersAtomicallyRequest) \
   DO(RosSetParametersAtomicallyResponse) DO(RosSetParametersRequest) DO(RosSetParametersResponse) \
   DO(RosPoint32) DO(RosPolygon) DO(RosSolidPrimitive) DO(RosMeshTriangle) DO(RosMesh) DO(RosPlane) DO(RosObjectType) \
-  DO(RosCollisionObject)
+  DO(RosCollisionObject) \
+  DO(RosAlternativePose) DO(RosParameterEstimate) DO(RosObjectBelief) DO(RosJointBelief) DO(RosBelief) DO(RosEvent) DO(RosQuery) \
+  DO(RosCancel) DO(RosEstimate) DO(RosAnswer) DO(RosProgress)
 // clang-format on

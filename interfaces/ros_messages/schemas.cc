@@ -8,11 +8,12 @@
 #include "prescene/core/check.h"
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/planning_messages.h"
+#include "prescene/interfaces/ros_messages/prescene_messages.h"
 
 namespace prescene::interfaces {
 namespace {
 
-constexpr std::array<RosType, 66> kTypes = {{
+constexpr std::array<RosType, 77> kTypes = {{
     {"builtin_interfaces/msg/Duration", "builtin_interfaces::msg::dds_::Duration_",
      "RIHS01_e8d009f659816f758b75334ee1a9ca5b5c0b859843261f14c7f937349599d93b",
      "int32 sec\n"
@@ -115,6 +116,105 @@ constexpr std::array<RosType, 66> kTypes = {{
      "RIHS01_5eb3ee3976403366d7c50d7dbee8bec96b3bced1e752674a7194a35841632134",
      "string key\n"
      "string db\n"},
+    {"prescene_msgs/msg/AlternativePose", "prescene_msgs::msg::dds_::AlternativePose_",
+     "RIHS01_9954042cc8c1dcdef287801088d570ebb068354c7fe9d7b54f6ddfc2a9342d35",
+     "geometry_msgs/Pose pose\n"
+     "float64 probability\n"},
+    {"prescene_msgs/msg/Answer", "prescene_msgs::msg::dds_::Answer_",
+     "RIHS01_efcfd7be68d212ba34e9ac30edf2814b1bd0d3b8b0954267b31875117226cad2",
+     "string id\n"
+     "uint64 step\n"
+     "string kind\n"
+     "uint8 state\n"
+     "string error\n"
+     "string code\n"
+     "Estimate[] estimates\n"
+     "ObjectBelief[] objects\n"
+     "uint64 instances\n"
+     "bool converged\n"
+     "string[] remarks\n"
+     "string json\n"},
+    {"prescene_msgs/msg/Belief", "prescene_msgs::msg::dds_::Belief_",
+     "RIHS01_a945edb421d1568e31a97d0bc71e3afaaf36b11cbeffa93e17e6be0ddfcfab01",
+     "std_msgs/Header header\n"
+     "uint64 step\n"
+     "ObjectBelief[] objects\n"
+     "JointBelief[] joints\n"},
+    {"prescene_msgs/msg/Cancel", "prescene_msgs::msg::dds_::Cancel_",
+     "RIHS01_3b106f59f649925baad21471a0c005a2bff6d6e4904e12a2870193cd84782fe8",
+     "string question\n"
+     "string id\n"},
+    {"prescene_msgs/msg/Estimate", "prescene_msgs::msg::dds_::Estimate_",
+     "RIHS01_617c4b889e78cbbb96ee52e0593760df30e5c2889d48ea9514b0156fbb1d093e",
+     "string name\n"
+     "string group\n"
+     "string subject\n"
+     "string other\n"
+     "float64 probability\n"
+     "float64 low\n"
+     "float64 high\n"},
+    {"prescene_msgs/msg/Event", "prescene_msgs::msg::dds_::Event_",
+     "RIHS01_317b24b1482d0fcc6aec00524d2bff630813521ac6c1f06341eb2514ad362607",
+     "std_msgs/Header header\n"
+     "uint64 step\n"
+     "string event\n"
+     "string object\n"
+     "string support\n"
+     "string camera\n"
+     "string previous\n"
+     "string current\n"
+     "string reason\n"},
+    {"prescene_msgs/msg/JointBelief", "prescene_msgs::msg::dds_::JointBelief_",
+     "RIHS01_cd741e7c4e6bc7e3078b01008f41ed76b6ccea1f6abfd16c401941b083ae8e0d",
+     "string name\n"
+     "uint8 type\n"
+     "float64 position\n"
+     "float64 standard_deviation\n"
+     "float64 velocity\n"
+     "float64 lower\n"
+     "float64 upper\n"
+     "float64 confidence\n"},
+    {"prescene_msgs/msg/ObjectBelief", "prescene_msgs::msg::dds_::ObjectBelief_",
+     "RIHS01_b3cda5ad105cc5af49efe1e46687e47519944c09cfb017fb6c8b59d403ea2737",
+     "string name\n"
+     "string model\n"
+     "uint8 state\n"
+     "uint8 motion\n"
+     "string held_by\n"
+     "float64 confidence\n"
+     "float64 existence\n"
+     "float64 visible_share\n"
+     "geometry_msgs/PoseWithCovariance pose\n"
+     "geometry_msgs/Twist twist\n"
+     "ParameterEstimate[] parameters\n"
+     "uint32 lessons\n"
+     "builtin_interfaces/Time learned\n"
+     "AlternativePose[] alternatives\n"
+     "bool is_new\n"
+     "geometry_msgs/Vector3 size\n"},
+    {"prescene_msgs/msg/ParameterEstimate", "prescene_msgs::msg::dds_::ParameterEstimate_",
+     "RIHS01_0e8b5962f09bc471709fd61a356003fe88c0205f3bd32da3fb920a573fc1bdd5",
+     "string name\n"
+     "float64 mean\n"
+     "float64 standard_deviation\n"
+     "float64 low\n"
+     "float64 high\n"},
+    {"prescene_msgs/msg/Progress", "prescene_msgs::msg::dds_::Progress_",
+     "RIHS01_e220c0d7c00b83fe5465431a7646686c149ad49e662bbebdbbce6edd59266021",
+     "string id\n"
+     "float64 fraction\n"
+     "string text\n"
+     "float64 seconds_left\n"},
+    {"prescene_msgs/msg/Query", "prescene_msgs::msg::dds_::Query_",
+     "RIHS01_196f072494fe2853e1b4db466d62a2954ff7cd69fffa453b273b4e4d8fd8becc",
+     "string id\n"
+     "string kind\n"
+     "string object\n"
+     "float64 duration\n"
+     "float64 max_seconds\n"
+     "bool stream\n"
+     "string[] detail\n"
+     "string arguments\n"},
     {"rcl_interfaces/msg/FloatingPointRange", "rcl_interfaces::msg::dds_::FloatingPointRange_",
      "RIHS01_e6af23a23c177fee5f3075c8b1e435162a9b63c863d78c06017460b49684262d",
      "float64 from_value\n"
@@ -419,6 +519,17 @@ PRESCENE_NAME(RosTransformStamped, "geometry_msgs/msg/TransformStamped")
 PRESCENE_NAME(RosTwist, "geometry_msgs/msg/Twist")
 PRESCENE_NAME(RosTwistStamped, "geometry_msgs/msg/TwistStamped")
 PRESCENE_NAME(RosVector3, "geometry_msgs/msg/Vector3")
+PRESCENE_NAME(RosAlternativePose, "prescene_msgs/msg/AlternativePose")
+PRESCENE_NAME(RosAnswer, "prescene_msgs/msg/Answer")
+PRESCENE_NAME(RosBelief, "prescene_msgs/msg/Belief")
+PRESCENE_NAME(RosCancel, "prescene_msgs/msg/Cancel")
+PRESCENE_NAME(RosEstimate, "prescene_msgs/msg/Estimate")
+PRESCENE_NAME(RosEvent, "prescene_msgs/msg/Event")
+PRESCENE_NAME(RosJointBelief, "prescene_msgs/msg/JointBelief")
+PRESCENE_NAME(RosObjectBelief, "prescene_msgs/msg/ObjectBelief")
+PRESCENE_NAME(RosParameterEstimate, "prescene_msgs/msg/ParameterEstimate")
+PRESCENE_NAME(RosProgress, "prescene_msgs/msg/Progress")
+PRESCENE_NAME(RosQuery, "prescene_msgs/msg/Query")
 PRESCENE_NAME(RosFloatingPointRange, "rcl_interfaces/msg/FloatingPointRange")
 PRESCENE_NAME(RosIntegerRange, "rcl_interfaces/msg/IntegerRange")
 PRESCENE_NAME(RosListParametersResult, "rcl_interfaces/msg/ListParametersResult")

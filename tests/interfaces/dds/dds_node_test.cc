@@ -98,6 +98,48 @@ TEST(DdsNode, CarriesLargeImages) {
   expect_round_trip(image, "sensor_msgs/msg/Image");
 }
 
+TEST(DdsNode, CarriesPrescenesOwnMessages) {
+  RosObjectBelief object;
+  object.name = "mug";
+  object.model = "mug of clay";
+  object.state = 1;
+  object.motion = 3;
+  object.held_by = "gripper";
+  object.confidence = 0.75;
+  object.existence = 0.5;
+  object.visible_share = 0.25;
+  object.pose.pose = {{1.0, 2.0, 3.0}, {0.1, 0.2, 0.3, 0.9}};
+  for (std::size_t i = 0; i < 36; ++i) object.pose.covariance[i] = 0.25 * static_cast<double>(i);
+  object.twist = {{1.0, 2.0, 3.0}, {4.0, 5.0, 6.0}};
+  object.parameters = {{"friction", 0.5, 0.1, 0.3, 0.7}, {"mass", 0.2, 0.01, 0.19, 0.21}};
+  object.lessons = 7;
+  object.learned = {5, 6};
+  object.alternatives = {{{{1.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, 0.125}};
+  object.is_new = true;
+  object.size = {0.1, 0.2, 0.3};
+  const RosJointBelief joint{"lid", 1, 0.5, 0.1, -0.2, -std::numeric_limits<double>::infinity(), 2.0, 0.75};
+  expect_round_trip(RosBelief{kHeader, 41, {object, object}, {joint}}, "prescene_msgs/msg/Belief");
+  expect_round_trip(RosEvent{kHeader, 41, "held", "mug", "table", "side", "hand", "gripper", "a release was seen"},
+                    "prescene_msgs/msg/Event");
+  expect_round_trip(RosQuery{"7", "predict", "mug", 2.0, 0.5, true, {"inputs", "chaos"}, "{\"actions\": []}"},
+                    "prescene_msgs/msg/Query");
+  expect_round_trip(RosCancel{"7", "c"}, "prescene_msgs/msg/Cancel");
+  expect_round_trip(RosAnswer{"7",
+                              41,
+                              "predict",
+                              1,
+                              "none",
+                              "not_found",
+                              {{"in_bin", "ends", "milk", "bin", 0.5, 0.25, 0.75}},
+                              {object},
+                              384,
+                              true,
+                              {"a remark", "another"},
+                              "{}"},
+                    "prescene_msgs/msg/Answer");
+  expect_round_trip(RosProgress{"7", 0.5, "simulating", -1.0}, "prescene_msgs/msg/Progress");
+}
+
 TEST(DdsNode, CarriesEveryFieldOfTheOtherTypes) {
   RosCameraInfo info;
   info.header = kHeader;

@@ -26,7 +26,8 @@ using AllMessages =
                    RosParameterEvent, RosParameterDescriptor, RosListParametersRequest, RosListParametersResponse,
                    RosGetParametersRequest, RosGetParametersResponse, RosGetParameterTypesResponse,
                    RosDescribeParametersResponse, RosSetParametersRequest, RosSetParametersResponse, RosSolidPrimitive,
-                   RosMesh, RosPlane, RosObjectType, RosCollisionObject>;
+                   RosMesh, RosPlane, RosObjectType, RosCollisionObject, RosObjectBelief, RosJointBelief, RosBelief,
+                   RosEvent, RosQuery, RosCancel, RosAnswer, RosProgress>;
 TYPED_TEST_SUITE(CdrLaws, AllMessages);
 
 TYPED_TEST(CdrLaws, DecodingAndEncodingGivesTheBytesBackAndBothByteOrdersTheSameValues) {

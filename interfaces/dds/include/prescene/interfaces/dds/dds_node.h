@@ -22,6 +22,7 @@
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/parameter_messages.h"
 #include "prescene/interfaces/ros_messages/planning_messages.h"
+#include "prescene/interfaces/ros_messages/prescene_messages.h"
 
 namespace prescene::interfaces {
 
@@ -119,8 +120,8 @@ class DdsNode {
 
   /// Calls `on_message` for each sample, from the node's one thread, until the node ends. Topics take turns, so that a
   /// flood of one does not keep the others waiting. An exception that leaves `on_message` ends the work on its sample
-  /// only, which counts as dropped. Types: those of messages.h that ros_messages.idl holds; another one is
-  /// kUnsupported.
+  /// only, which counts as dropped. Types: those of messages.h that ros_messages.idl holds, and Prescene's own; another
+  /// one is kUnsupported.
   core::Status subscribe(const std::string& topic, const std::string& type, TopicQos qos,
                          std::function<void(ReceivedMessage&&)> on_message);
 
@@ -143,6 +144,12 @@ class DdsNode {
   core::Status publish(DdsPublisher publisher, const RosDiagnosticArray& message);
   core::Status publish(DdsPublisher publisher, const RosParameterEvent& message);
   core::Status publish(DdsPublisher publisher, const RosCollisionObject& message);
+  core::Status publish(DdsPublisher publisher, const RosBelief& message);
+  core::Status publish(DdsPublisher publisher, const RosEvent& message);
+  core::Status publish(DdsPublisher publisher, const RosQuery& message);
+  core::Status publish(DdsPublisher publisher, const RosCancel& message);
+  core::Status publish(DdsPublisher publisher, const RosAnswer& message);
+  core::Status publish(DdsPublisher publisher, const RosProgress& message);
   /// Decodes a recorded message of the publisher's type and publishes it.
   core::Status publish_cdr(DdsPublisher publisher, const std::vector<std::uint8_t>& cdr);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names, RIHS01 type hashes and `ros2msg` texts of the messages in messages.h, parameter_messages.h and
-// planning_messages.h, as ROS 2 Humble and Jazzy know them.
+// Names, RIHS01 type hashes and `ros2msg` texts of the messages in messages.h, parameter_messages.h,
+// planning_messages.h and prescene_messages.h, as ROS 2 Humble and Jazzy know them.
 #pragma once
 
 #include <span>
@@ -10,6 +10,7 @@
 #include "prescene/interfaces/ros_messages/messages.h"
 #include "prescene/interfaces/ros_messages/parameter_messages.h"
 #include "prescene/interfaces/ros_messages/planning_messages.h"
+#include "prescene/interfaces/ros_messages/prescene_messages.h"
 
 namespace prescene::interfaces {
 
@@ -67,6 +68,28 @@ template <>
 const RosType& ros_type<RosTwistStamped>();
 template <>
 const RosType& ros_type<RosVector3>();
+template <>
+const RosType& ros_type<RosAlternativePose>();
+template <>
+const RosType& ros_type<RosAnswer>();
+template <>
+const RosType& ros_type<RosBelief>();
+template <>
+const RosType& ros_type<RosCancel>();
+template <>
+const RosType& ros_type<RosEstimate>();
+template <>
+const RosType& ros_type<RosEvent>();
+template <>
+const RosType& ros_type<RosJointBelief>();
+template <>
+const RosType& ros_type<RosObjectBelief>();
+template <>
+const RosType& ros_type<RosParameterEstimate>();
+template <>
+const RosType& ros_type<RosProgress>();
+template <>
+const RosType& ros_type<RosQuery>();
 template <>
 const RosType& ros_type<RosFloatingPointRange>();
 template <>
