@@ -47,8 +47,10 @@ install(FILES packaging/prescene.service DESTINATION lib/systemd/system COMPONEN
 install(FILES packaging/prescene.bash DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions" RENAME prescene
         COMPONENT program_files)
 install(FILES packaging/service.conf DESTINATION "${CMAKE_INSTALL_DOCDIR}/examples" COMPONENT program_files)
-# The sources of a ROS package, for who calls the service /prescene/ask.
+# The sources of a ROS package: our messages, and the type of the service /prescene/ask. The same as IDL, for who uses DDS without ROS.
 install(DIRECTORY packaging/prescene_msgs DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files)
+install(FILES interfaces/dds/idl/prescene_msgs.idl interfaces/dds/idl/ros_messages.idl DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene/prescene_msgs/idl"
+        COMPONENT program_files)
 # For `ros2 launch` and `ros2 param load`.
 install(DIRECTORY packaging/launch DESTINATION "${CMAKE_INSTALL_DATADIR}/prescene" COMPONENT program_files
         FILES_MATCHING PATTERN "*.py" PATTERN "*.yaml")

@@ -217,7 +217,10 @@ ordered_json to_json(const BeliefSummary& summary) {
 }
 
 core::Result<BeliefSummary> belief_summary_from_json(const std::string& text) {
-  const ordered_json json = parse_or_discard(text);
+  return belief_summary_of_document(parse_or_discard(text));
+}
+
+core::Result<BeliefSummary> belief_summary_of_document(const ordered_json& json) {
   const auto is = [&json](const char* key, bool (ordered_json::*kind)() const noexcept) {
     return json.is_object() && json.contains(key) && (json[key].*kind)();
   };

@@ -11,6 +11,7 @@
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/belief_summary.h"
+#include "prescene/service/live/typed_messages.h"
 #include "prescene/service/tracking/camera_presets.h"
 
 namespace prescene::service {
@@ -69,8 +70,25 @@ void LiveService::Impl::publish_events(const std::vector<BeliefEvent>& happened)
   for (const BeliefEvent& event : happened) {
     const std::string json = belief::json_text(to_json(event));
     if (events_topic) check_sent(node->publish(*events_topic, interfaces::RosString{json}));
+    publish_typed_event(event);
     record(kEventsTopic, json);
   }
+}
+
+void LiveService::Impl::publish_typed_event(const BeliefEvent& event) {
+  const bool read = is_read(typed_events);
+  if (!read && !recording) return;
+  const auto message = event_message(event, settings.tracker.assembler.world_frame);
+  if (read) check_sent(node->publish(*typed_events, message));
+  record_output(kTypedEventsTopic, kTypedEventType, message, event.stamp_ns);
+}
+
+void LiveService::Impl::publish_typed_belief(const BeliefSummary& summary) {
+  const bool read = is_read(typed_beliefs);
+  if (!read && !recording) return;
+  const auto message = belief_message(summary, settings.tracker.assembler.world_frame);
+  if (read) check_sent(node->publish(*typed_beliefs, message));
+  record_output(kTypedBeliefTopic, kTypedBeliefType, message, summary.stamp_ns);
 }
 
 void LiveService::Impl::publish(const TrackerStep& step) {
@@ -79,6 +97,7 @@ void LiveService::Impl::publish(const TrackerStep& step) {
   const std::string& world = settings.tracker.assembler.world_frame;
   const std::string json = belief::json_text(to_json(summary));
   check_sent(node->publish(beliefs, interfaces::RosString{json}));
+  publish_typed_belief(summary);
   const core::TimeNs stamp_ns = summary.stamp_ns;
   publish(detections, kDetectionsTopic, kDetectionsType, detections_of(summary, *belief->scene, world), stamp_ns);
   if (all_poses) publish(*all_poses, kPosesTopic, kPosesType, poses_of(summary, world), stamp_ns);

@@ -100,9 +100,11 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
       raw->answered.push_back(answer);
     }
     raw->calls->note_answer(answer);
+    raw->tell_typed_answer(answer);
     if (raw->settings.on_answer) raw->settings.on_answer(answer);
   };
   PRESCENE_TRY(impl->answers, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kReliable));
+  impl->advertise_typed();
   ServiceCalls::Hooks hooks;
   hooks.ask = [raw](const std::string& question, const std::string& client) {
     raw->put_text(kQueryTopic, question);
@@ -114,12 +116,14 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   if (const auto progress = impl->advertised_if_allowed(kProgressTopic, "std_msgs/msg/String", ""))
     impl->settings.worker.on_progress = [raw, topic = *progress](const std::string& text) {
       raw->check_sent(raw->node->publish(topic, interfaces::RosString{text}));
+      raw->tell_typed_progress(text);
     };
   // By a writer of their own that never waits: whoever does not read them keeps nobody's answer. One that comes after
   // its answer is passed over by who asked. They are not recorded: the answer is.
   PRESCENE_TRY(impl->answers_so_far, impl->node->advertise(kAnswerTopic, "std_msgs/msg/String", TopicQos::kState));
   impl->settings.worker.on_answer_so_far = [raw](const std::string& answer) {
     raw->check_sent(raw->node->publish(raw->answers_so_far, interfaces::RosString{answer}));
+    raw->tell_typed_answer_so_far(answer);
   };
   impl->history = std::make_unique<HistoryKeeper>(backends, settings.history);
   impl->settings.worker.timeline = [raw] { return raw->history->timeline(); };
@@ -228,8 +232,9 @@ core::Status LiveService::Impl::join_bus() {
   PRESCENE_RETURN_IF_ERROR(parameter_services->offer());
   for (const BusTopic& topic : topics_of_cameras(cameras)) {
     if (topic.name == kAnswerTopic) continue;  // ours
-    const auto& take = topic.name == kQueryTopic ? deliver_question : deliver;
-    PRESCENE_RETURN_IF_ERROR(node->subscribe(topic.name, topic.type, topic.read, take));
+    auto take = typed_taker(topic.name);
+    if (!take) take = topic.name == kQueryTopic ? deliver_question : deliver;
+    PRESCENE_RETURN_IF_ERROR(node->subscribe(topic.name, topic.type, topic.read, std::move(take)));
   }
   return core::ok_status();
 }

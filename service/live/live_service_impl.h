@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <exception>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -55,6 +56,8 @@ struct LiveService::Impl {
   static constexpr const char* kMarkersType = "visualization_msgs/msg/MarkerArray";
   static constexpr const char* kTransformsType = "tf2_msgs/msg/TFMessage";
   static constexpr const char* kCollisionType = "moveit_msgs/msg/CollisionObject";
+  static constexpr const char* kTypedBeliefType = "prescene_msgs/msg/Belief";
+  static constexpr const char* kTypedEventType = "prescene_msgs/msg/Event";
   static constexpr const char* kPoseType = "geometry_msgs/msg/PoseWithCovarianceStamped";
 
   Impl(std::shared_ptr<const belief::Scene> a_scene, const LiveSettings& a_settings, std::unique_ptr<Tracker> a_tracker,
@@ -107,6 +110,9 @@ struct LiveService::Impl {
   void check_sent(const core::Status& status);
   void publish(const TrackerStep& step);
   void publish_events(const std::vector<BeliefEvent>& happened);
+  /// The message of prescene_msgs, where somebody reads it or it is recorded.
+  void publish_typed_belief(const BeliefSummary& summary);
+  void publish_typed_event(const BeliefEvent& event);
   /// Of the pose of an object that was found.
   void advertise_new(const std::string& object);
   /// Publishes whether frames come, where that changed.
@@ -139,8 +145,26 @@ struct LiveService::Impl {
   FrameHistory frames;  // for questions what happened, and why a pose is believed
   RateLimit learned_limit;
 
+  /// Topics of prescene_msgs: those to publish on, before there are questions, ...
+  void advertise_typed();
+  /// ... and who takes the messages of the others, as std::function for subscribe(); empty for all other topics.
+  std::function<void(interfaces::ReceivedMessage&&)> typed_taker(const std::string& topic);
+  void take_typed(const core::Result<std::string>& json, const std::string& id, std::uint64_t writer);
+  bool is_read(const std::optional<interfaces::DdsPublisher>& publisher) const {
+    return publisher && node->matched_readers(*publisher) > 0;
+  }
+  /// What was said as JSON, as the message that is made of it, where somebody reads it. From any thread.
+  template <class Message>
+  void publish_typed(const std::optional<interfaces::DdsPublisher>& publisher, Message (*made)(const std::string&),
+                     const std::string& json) noexcept;
+  void tell_typed_answer(const std::string& json) noexcept;
+  void tell_typed_answer_so_far(const std::string& json) noexcept;
+  void tell_typed_progress(const std::string& json) noexcept;
+
   interfaces::DdsPublisher beliefs, detections, markers, diagnostics, answers, answers_so_far;
   std::optional<interfaces::DdsPublisher> transforms, all_poses, events_topic, collisions;
+  std::optional<interfaces::DdsPublisher> typed_beliefs, typed_events, typed_answers, typed_answers_so_far,
+      typed_progress;
   BeliefEvents events;
   PlanningScene planning;
   std::map<std::string, interfaces::DdsPublisher> poses;

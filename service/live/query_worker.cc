@@ -157,16 +157,27 @@ void QueryWorker::take(std::string question_json, const std::string& client) {
 
 void QueryWorker::note_no_room(const std::string& question_json, const core::Status& reason) {
   try {
-    const auto is_full = [this] { return too_many_.size() >= kMostRefusalsWaiting; };
     {
       const std::lock_guard lock(mutex_);
-      if (question_json.size() > kLongestWithId || is_full()) {
+      if (question_json.size() > kLongestWithId || too_many_.size() >= kMostRefusalsWaiting) {
         ++counts_.unanswered;
         return;
       }
     }
-    Refusal refusal{id_of(question_json), reason};
+    turn_away(id_of(question_json), reason);
+  } catch (const std::exception&) {
+    drop();
+  }
+}
+
+void QueryWorker::turn_away(const std::string& id, const core::Status& reason) {
+  try {
+    Refusal refusal{id.size() <= kLongestWithId ? id : "", reason};
     const std::lock_guard lock(mutex_);
+    if (too_many_.size() >= kMostRefusalsWaiting) {
+      ++counts_.unanswered;
+      return;
+    }
     too_many_.push_back(std::move(refusal));
     read_changed_.notify_one();
   } catch (const std::exception&) {

@@ -97,6 +97,8 @@ std::vector<BusTopic> bus_topics(const InputTopics& topics) {
       {kControlTopic, "std_msgs/msg/String", TopicQos::kCommands, TopicQos::kCommands},
       {kQueryTopic, "std_msgs/msg/String", TopicQos::kCommands, TopicQos::kCommands},
       {kAnswerTopic, "std_msgs/msg/String", TopicQos::kCommands, TopicQos::kReliable},
+      {kTypedQueryTopic, "prescene_msgs/msg/Query", TopicQos::kCommands, TopicQos::kCommands},
+      {kTypedCancelTopic, "prescene_msgs/msg/Cancel", TopicQos::kCommands, TopicQos::kCommands},
   };
   std::erase_if(rows, [](const BusTopic& row) { return row.name.empty(); });
   return rows;

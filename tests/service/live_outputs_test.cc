@@ -7,10 +7,12 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/interfaces/images/jpeg.h"
+#include "prescene/interfaces/mcap/mcap_reader.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/live/overlay_publisher.h"
 #include "tests/service/live_service_fixture.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service::live_outputs_test {
 namespace {
@@ -130,6 +132,110 @@ TEST_F(LiveOutputsTest, TheOverlayIsTheFrameWithTheBeliefDrawnOverIt) {
   ASSERT_TRUE(picture.ok()) << picture.status().message();
   EXPECT_EQ(picture->width(), static_cast<int>(depth.width));
   EXPECT_THAT(packed.format, ::testing::HasSubstr("jpeg"));
+}
+
+TEST_F(LiveOutputsTest, BeliefAndEventsComeAsMessages) {
+  listen(kTypedBeliefTopic, "prescene_msgs/msg/Belief");
+  listen(kTypedEventsTopic, "prescene_msgs/msg/Event");
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  const auto began = [&] {
+    const auto events = heard<interfaces::RosEvent>(kTypedEventsTopic);
+    return std::any_of(events.begin(), events.end(), [](const auto& event) { return event.event == "clock_set_back"; });
+  };
+  ASSERT_TRUE(robot_.send_until([&] { return began() && !heard<interfaces::RosBelief>(kTypedBeliefTopic).empty(); },
+                                kNoon - 3600 * kSecond));
+  const interfaces::RosBelief belief = heard<interfaces::RosBelief>(kTypedBeliefTopic).back();
+  EXPECT_EQ(belief.header.frame_id, "world");
+  EXPECT_GT(belief.step, 0U);
+  ASSERT_EQ(belief.objects.size(), 1U);
+  EXPECT_EQ(belief.objects[0].name, "box");
+  EXPECT_EQ(belief.objects[0].state, static_cast<std::uint8_t>(interfaces::RosObjectState::kTracked));
+  EXPECT_NEAR(belief.objects[0].pose.pose.position.z, 0.05, 0.03);
+  for (const auto& event : heard<interfaces::RosEvent>(kTypedEventsTopic)) {
+    EXPECT_EQ(event.header.frame_id, "world");
+    if (event.event == "found") {
+      EXPECT_EQ(event.object, "box");
+      EXPECT_EQ(event.current, "tracked");
+    }
+  }
+}
+
+TEST_F(LiveOutputsTest, BeliefsAreRecordedAsMessagesThoughNobodyListens) {
+  const tests::ScratchDir folder;
+  auto recording = RollingRecording::create(folder.path() / "run.mcap", {});
+  ASSERT_TRUE(recording.ok()) << recording.status().message();
+  start(*std::move(recording));
+  ASSERT_TRUE(tracks_from(kNoon));
+  ASSERT_TRUE(stop().ok());
+  interfaces::McapReaderOptions options;
+  options.topics = {kTypedBeliefTopic};
+  auto reader = interfaces::McapReader::open(folder.path() / "run.mcap", options);
+  ASSERT_TRUE(reader.ok()) << reader.status().message();
+  std::uint64_t last_step = 0;
+  for (;;) {
+    const auto message = (*reader)->next();
+    ASSERT_TRUE(message.ok()) << message.status().message();
+    if (!*message) break;
+    const auto belief = interfaces::decode_cdr<interfaces::RosBelief>((*message)->data);
+    ASSERT_TRUE(belief.ok()) << belief.status().message();
+    EXPECT_EQ(belief->step, last_step + 1);
+    last_step = belief->step;
+    ASSERT_EQ(belief->objects.size(), 1U);
+    EXPECT_EQ(belief->objects[0].name, "box");
+  }
+  EXPECT_GE(last_step, 3U);
+}
+
+TEST_F(LiveOutputsTest, AQuestionAsAMessageIsAnsweredAsMessageAndAsJson) {
+  listen(kTypedAnswerTopic, "prescene_msgs/msg/Answer");
+  listen(kAnswerTopic, "std_msgs/msg/String");
+  start();
+  const auto queries = node_->advertise(kTypedQueryTopic, "prescene_msgs/msg/Query", TopicQos::kReliable);
+  const auto cancels = node_->advertise(kTypedCancelTopic, "prescene_msgs/msg/Cancel", TopicQos::kReliable);
+  ASSERT_TRUE(queries.ok() && cancels.ok());
+  const auto answer_to = [&](const std::string& id) {
+    for (const auto& answer : heard<interfaces::RosAnswer>(kTypedAnswerTopic))
+      if (answer.id == id) return std::optional(answer);
+    return std::optional<interfaces::RosAnswer>();
+  };
+  // Asked again until answered: who comes late to the bus misses what was said before.
+  const auto answered = [&](const std::string& id, const std::function<void()>& ask) {
+    return robot_.send_until(
+        [&] {
+          ask();
+          return answer_to(id).has_value();
+        },
+        kNoon);
+  };
+  const auto asked = [&](const interfaces::RosQuery& query) {
+    return answered(query.id, [&] { static_cast<void>(node_->publish(*queries, query)); });
+  };
+  ASSERT_TRUE(asked({"w", "where", "box", 0.0, 0.0, false, {}, ""}));
+  const interfaces::RosAnswer where = *answer_to("w");
+  EXPECT_EQ(where.kind, "where");
+  EXPECT_EQ(where.state, static_cast<std::uint8_t>(interfaces::RosAnswerState::kAnswered));
+  ASSERT_EQ(where.objects.size(), 1U);
+  EXPECT_EQ(where.objects[0].name, "box");
+  const auto texts = heard<interfaces::RosString>(kAnswerTopic);
+  EXPECT_TRUE(std::any_of(texts.begin(), texts.end(), [&](const auto& text) { return text.data == where.json; }));
+
+  ASSERT_TRUE(asked({"s", "stability", "box", 0.5, 0.2, false, {}, ""}));
+  ASSERT_EQ(answer_to("s")->estimates.size(), 1U);
+  EXPECT_EQ(answer_to("s")->estimates[0].subject, "box");
+
+  const auto is_refused = [&](const std::string& id, const std::string& reason) {
+    const interfaces::RosAnswer refused = *answer_to(id);
+    EXPECT_EQ(refused.state, static_cast<std::uint8_t>(interfaces::RosAnswerState::kRefused));
+    EXPECT_EQ(refused.code, "invalid_input");
+    EXPECT_THAT(refused.error, ::testing::HasSubstr(reason));
+  };
+  ASSERT_TRUE(asked({"a", "where", "box", 0.0, 0.0, false, {}, "[]"}));
+  is_refused("a", "arguments: this is not a JSON object");
+  ASSERT_TRUE(asked({"k", "levitate", "box", 0.0, 0.0, false, {}, ""}));
+  is_refused("k", "one of the keys where, predict");
+  ASSERT_TRUE(answered("c", [&] { static_cast<void>(node_->publish(*cancels, interfaces::RosCancel{"none", "c"})); }));
+  EXPECT_EQ(answer_to("c")->code, "not_found");
 }
 
 TEST_F(LiveOutputsTest, NoOverlayIsWantedWhereNobodyLooks) {

@@ -84,6 +84,7 @@ class WorkerUnderTest {
     changed_.wait_for(lock, patience, [&] { return answers_.size() >= count; });
     return answers_;
   }
+  void turn_away(const std::string& id, const core::Status& reason) { worker_->turn_away(id, reason); }
   void begin_session(core::TimeNs first_frame_ns) { worker_->begin_session(first_frame_ns); }
   service::QueryCounts counts() const { return worker_->counts(); }
 

@@ -254,6 +254,16 @@ TEST(QueryWorker, AQuestionThatIsAskedAgainWhileItWaitsIsAnsweredOnce) {
   EXPECT_EQ(id_of(answers[2]), "last");
 }
 
+TEST(QueryWorker, TurnsAwayWhatWasNoQuestionInAnotherForm) {
+  WorkerUnderTest worker({});
+  worker.turn_away("7", core::invalid_input("kind: give one, such as 'where'"));
+  const auto answer = parse_or_discard(worker.answers(1)[0]);
+  EXPECT_EQ(answer["id"], "7");
+  EXPECT_EQ(answer["error"], "kind: give one, such as 'where'");
+  EXPECT_EQ(answer["code"], "invalid_input");
+  EXPECT_EQ(worker.counts().refused, 1U);
+}
+
 TEST(QueryWorker, AQuestionThatIsNotUnderstoodIsAnsweredWithTheReason) {
   WorkerUnderTest worker({});
   worker.ask("{");

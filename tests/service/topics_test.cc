@@ -30,7 +30,7 @@ TEST(Topics, SayByTheirNamesThatTheyAreRectified) {
 }
 
 TEST(BusTopics, ControlsQuestionsAndAnswersAreReadWithoutOneReplacingAnother) {
-  for (const char* name : {kControlTopic, kQueryTopic, kAnswerTopic}) {
+  for (const char* name : {kControlTopic, kQueryTopic, kAnswerTopic, kTypedQueryTopic, kTypedCancelTopic}) {
     EXPECT_EQ(named(name).read, TopicQos::kCommands) << name;
   }
   EXPECT_EQ(offered_as(kControlTopic, "std_msgs/msg/String"), TopicQos::kCommands);

@@ -55,6 +55,7 @@ BeliefSummary summary_of(const belief::Belief& belief);
 /// "limits", "confidence"}]}
 nlohmann::ordered_json to_json(const BeliefSummary& summary);
 core::Result<BeliefSummary> belief_summary_from_json(const std::string& text);
+core::Result<BeliefSummary> belief_summary_of_document(const nlohmann::ordered_json& json);
 
 /// Messages for ROS users. Lost objects are in none of them.
 interfaces::RosDetection3dArray detections_of(const BeliefSummary& summary, const belief::Scene& scene,

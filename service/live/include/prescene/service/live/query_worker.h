@@ -114,6 +114,11 @@ class QueryWorker {
   /// refused question. `client` says who asks: clients take turns. No exception leaves it.
   void ask(std::string question_json, const std::string& client = {});
 
+  /// Answers a question that is none with the reason, on the worker's thread: for who reads questions in another form.
+  /// It counts as ask() does: as refused, or as unanswered where too many such answers wait. From any thread; no
+  /// exception leaves it.
+  void turn_away(const std::string& id, const core::Status& reason);
+
   QueryCounts counts() const;
 
   /// Instead of QueryWorkerSettings::default_seconds and most_seconds, for questions that are read, or begun, from now

@@ -60,7 +60,14 @@ inline constexpr const char* kOverlayTopic = "/prescene/overlay/image";  ///< ou
 inline constexpr const char* kOverlayCompressedTopic = "/prescene/overlay/image/compressed";  ///< out: the same as JPEG
 inline constexpr const char* kOverlayInfoTopic = "/prescene/overlay/camera_info";  ///< out: sensor_msgs/CameraInfo
 inline constexpr const char* kCollisionTopic = "/collision_object";  ///< out: moveit_msgs/CollisionObject, for MoveIt
-inline constexpr const char* kDiagnosticsTopic = "/diagnostics";     ///< out: diagnostic_msgs/DiagnosticArray
+// The same as messages of prescene_msgs, for who reads no JSON.
+inline constexpr const char* kTypedQueryTopic = "/prescene/typed/query";        ///< in: prescene_msgs/Query
+inline constexpr const char* kTypedCancelTopic = "/prescene/typed/cancel";      ///< in: prescene_msgs/Cancel
+inline constexpr const char* kTypedAnswerTopic = "/prescene/typed/answer";      ///< out: prescene_msgs/Answer
+inline constexpr const char* kTypedProgressTopic = "/prescene/typed/progress";  ///< out: prescene_msgs/Progress
+inline constexpr const char* kTypedBeliefTopic = "/prescene/typed/belief";      ///< out: prescene_msgs/Belief
+inline constexpr const char* kTypedEventsTopic = "/prescene/typed/events";      ///< out: prescene_msgs/Event
+inline constexpr const char* kDiagnosticsTopic = "/diagnostics";  ///< out: diagnostic_msgs/DiagnosticArray
 /// Whether a message holds transforms of objects alone, which a service published: none of the robot's.
 bool are_of_objects(const interfaces::ReceivedMessage& message);
 /// out: geometry_msgs/PoseWithCovarianceStamped of each object
