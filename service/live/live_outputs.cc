@@ -183,6 +183,7 @@ ServiceHealth LiveService::Impl::health() const {
   health.learned_failure = learned_failure;
   health.questions = worker->counts();
   health.unreadable_questions = unreadable_questions;
+  health.refused_requests = parameter_services->refused();
   health.failures = failures;
   health.last_failure = last_failure;
   health.last_failure_ns = last_failure_ns;

@@ -143,7 +143,8 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
           raw->put_text(kSettingsTopic, running_settings_text(raw->running));
       });
   impl->parameter_services =
-      std::make_unique<ParameterServices>(*impl->node, *impl->parameters, settings.dds.node_name, impl->log);
+      std::make_unique<ParameterServices>(*impl->node, *impl->parameters, settings.dds.node_name, impl->log,
+                                          [raw](const core::Status& why) { raw->check_sent(why); });
   PRESCENE_RETURN_IF_ERROR(impl->join_bus());
   return std::unique_ptr<LiveService>(new LiveService(std::move(impl)));
 }

@@ -22,8 +22,8 @@ std::string text_of(const ParameterValue& value) {
 }  // namespace
 
 ParameterServices::ParameterServices(interfaces::DdsNode& node, ParameterTable& table, const std::string& node_name,
-                                     core::LogSink log)
-    : node_(node), table_(table), node_name_("/" + node_name), log_(std::move(log)) {}
+                                     core::LogSink log, std::function<void(const core::Status&)> on_unsent)
+    : node_(node), table_(table), node_name_("/" + node_name), log_(std::move(log)), on_unsent_(std::move(on_unsent)) {}
 
 template <class Request, class Answer>
 core::Status ParameterServices::offer(const std::string& name, const std::string& type, Answer answer) {
@@ -31,9 +31,14 @@ core::Status ParameterServices::offer(const std::string& name, const std::string
       node_name_ + "/" + name, "rcl_interfaces/srv/" + type,
       [this, name, answer = std::move(answer)](interfaces::ServiceRequest&& request) {
         const auto asked = interfaces::decode_cdr<Request>(request.fields, interfaces::kSmallMessage);
-        const core::Status replied = asked ? node_.reply(request, answer(*asked)) : asked.status();
-        if (!replied.ok())
-          core::log(log_, core::LogLevel::kWarning, node_name_ + "/" + name + ": " + replied.message());
+        if (!asked) {
+          refused_.fetch_add(1, std::memory_order_relaxed);
+          core::log(log_, core::LogLevel::kWarning,
+                    node_name_ + "/" + name + ": a request was refused: " + asked.status().message());
+          return;
+        }
+        const core::Status replied = node_.reply(request, answer(*asked));
+        if (!replied.ok()) on_unsent_(replied);
       });
 }
 
@@ -78,7 +83,7 @@ void ParameterServices::tell(const interfaces::RosParameter& set) {
   event.node = node_name_;
   event.changed_parameters.push_back({set.name, to_ros_value(*value)});
   const core::Status sent = node_.publish(events_, event);
-  if (!sent.ok()) core::log(log_, core::LogLevel::kWarning, sent.message());
+  if (!sent.ok()) on_unsent_(sent);
 }
 
 }  // namespace prescene::service

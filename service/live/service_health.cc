@@ -15,8 +15,9 @@ using interfaces::RosDiagnosticLevel;
 std::uint64_t losses_of(const ServiceHealth& health) {
   std::uint64_t sum = health.lost_on_bus + health.unsent + health.failures + health.tf_forgotten + health.tf_late +
                       health.dropped_controls + health.idle_controls + health.unreadable_questions +
-                      health.questions.unanswered + health.questions.failed + health.recording.interruptions +
-                      health.recording.lost_messages + health.recording.not_repeated + health.recording.unfinished;
+                      health.refused_requests + health.questions.unanswered + health.questions.failed +
+                      health.recording.interruptions + health.recording.lost_messages + health.recording.not_repeated +
+                      health.recording.unfinished;
   for (const auto& [topic, count] : health.dropped_in_inbox) {
     const auto& images = health.image_topics;
     if (std::find(images.begin(), images.end(), topic) == images.end()) sum += count;
@@ -82,12 +83,12 @@ std::string joined(const std::vector<std::string>& words) {
 // Every member is bound to a name, so that one which is added does not compile until it is told of here.
 std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
   const auto& [depth_topic, cameras, nothing_came, steps, skipped_frames, refused_messages, dropped_in_inbox,
-               image_topics, lost_on_bus, questions, unreadable_questions, unsent, failures, unlogged, tf_forgotten,
-               tf_late, waiting_controls, dropped_controls, idle_controls, last_idle_control, other_services,
-               is_recording, recording, recording_at_risk_s, recording_failure, keeps_learned, learned_failure,
-               seconds_since_frame, clock_topic, simulated_now_s, seconds_since_tick, last_step_seconds, not_simulated,
-               physics_failure, steppers, lens, degraded, last_skip, last_refusal, last_failure, last_failure_ns] =
-      health;
+               image_topics, lost_on_bus, questions, unreadable_questions, refused_requests, unsent, failures, unlogged,
+               tf_forgotten, tf_late, waiting_controls, dropped_controls, idle_controls, last_idle_control,
+               other_services, is_recording, recording, recording_at_risk_s, recording_failure, keeps_learned,
+               learned_failure, seconds_since_frame, clock_topic, simulated_now_s, seconds_since_tick,
+               last_step_seconds, not_simulated, physics_failure, steppers, lens, degraded, last_skip, last_refusal,
+               last_failure, last_failure_ns] = health;
   const auto& [answered, refused, unanswered, repeated, cancels, failed, question_failure, question_failure_ns] =
       questions;
   const auto& [lockstep, bullet_instead, last_reason] = steppers;
@@ -147,6 +148,7 @@ std::vector<interfaces::RosKeyValue> values_of(const ServiceHealth& health) {
           {"questions refused", std::to_string(refused)},
           {"questions without an answer", std::to_string(unanswered + unreadable_questions)},
           {"questions repeated", std::to_string(repeated)},
+          {"requests for parameters refused", std::to_string(refused_requests)},
           {"requests to cancel", std::to_string(cancels)},
           {"failures", std::to_string(failures + failed)},
           {"last failure", question_is_newer && !question_failure.empty() ? question_failure : last_failure},

@@ -224,5 +224,27 @@ TEST_F(HostileBus, EachControlThatMakesNoSenseIsCounted) {
   EXPECT_TRUE(stop().ok());
 }
 
+// Behind their fields, which say that there are no names, are bytes that no reader of the type asked for.
+TEST_F(HostileBus, RequestsForParametersThatMakeNoSenseAreCountedAndSaid) {
+  start();
+  ASSERT_TRUE(tracks_from(kNoon));
+  tests::RawWriter requests(tests::own_domain(), "rq/prescene/get_parametersRequest",
+                            "rcl_interfaces::srv::dds_::GetParameters_Request_");
+  ASSERT_TRUE(requests.wait_for_reader());
+  EXPECT_EQ(told("requests for parameters refused"), 0u);
+  for (std::uint64_t count = 1; count <= 3; ++count) {
+    requests.write({});
+    ASSERT_TRUE(
+        robot_.send_until([&] { return told("requests for parameters refused") == count; }, kNoon + 10 * kSecond))
+        << count;
+  }
+  {
+    const std::lock_guard lock(log_mutex_);
+    EXPECT_THAT(log_, ::testing::Contains(::testing::HasSubstr("/get_parameters: a request was refused: ")));
+  }
+  EXPECT_TRUE(answers_where("after", kNoon + 1000 * kSecond));
+  EXPECT_TRUE(stop().ok());
+}
+
 }  // namespace
 }  // namespace prescene::service::hostile_bus_test

@@ -62,6 +62,7 @@ TEST(ServiceHealth, CarriesItsCounts) {
   health.dropped_controls = 29;
   health.questions = {11, 13, 17, 19, 31, 2, "no", 5};
   health.unreadable_questions = 1;
+  health.refused_requests = 37;
   health.failures = 4;
   health.not_simulated = 111;
   health.physics_failure = "no simulator could be made";
@@ -77,6 +78,7 @@ TEST(ServiceHealth, CarriesItsCounts) {
                                                      {"questions refused", "13"},
                                                      {"questions without an answer", "18"},
                                                      {"questions repeated", "19"},
+                                                     {"requests for parameters refused", "37"},
                                                      {"failures", "6"},
                                                      {"particles without physics", "111"},
                                                      {"last failure of physics", "no simulator could be made"},
@@ -139,6 +141,7 @@ TEST(ServiceHealth, WarnsOfWhatWasLostSinceTheLastReportAndNotForEver) {
       [](ServiceHealth& health) { ++health.questions.failed; },
       [](ServiceHealth& health) { ++health.questions.unanswered; },
       [](ServiceHealth& health) { ++health.unreadable_questions; },
+      [](ServiceHealth& health) { ++health.refused_requests; },
       [](ServiceHealth& health) { ++health.lost_on_bus; },
       [](ServiceHealth& health) { ++health.unsent; },
       [](ServiceHealth& health) { ++health.tf_forgotten; },

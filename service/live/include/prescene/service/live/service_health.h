@@ -33,6 +33,7 @@ struct ServiceHealth {
   std::uint64_t lost_on_bus = 0;  ///< Samples that reached this process and were never read.
   QueryCounts questions;
   std::uint64_t unreadable_questions = 0;  ///< Messages on the topic of questions that hold no text.
+  std::uint64_t refused_requests = 0;      ///< To the services of parameters: they made no sense, and got no reply.
   std::uint64_t unsent = 0;          ///< Messages of ours that the middleware did not take: a reader does not keep up.
   std::uint64_t failures = 0;        ///< Messages and frames that ended in an exception and were left out.
   std::uint64_t unlogged = 0;        ///< Lines that were left out of the log because too many came.
