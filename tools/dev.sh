@@ -21,8 +21,9 @@ usage: ./dev VERB
                                a day) and on the K-th of N parts of the rest
   format [FILE]...             format the sources in place
   faults [FAULT] [SECONDS]     do to a running service what may happen to it, and print what came of it: all, or one of kill, power,
-                               disk, rights, descriptors, memory, clock, publishers, second, reader, supervisor, flood, soak.
-                               SECONDS: how long soak and flood last (default 180 and 30)
+                               disk, rights, descriptors, memory, clock, publishers, second, reader, supervisor, flood, soak;
+                               packets, which is not among all: malformed packets of RTPS (tools/packet_storm).
+                               SECONDS: how long soak, flood and packets last (default 180, 30 and 120)
   fuzz [TARGET] [SECONDS]      run libFuzzer on one target or all, 60 s each
   fuzz --coverage [TARGET]...  what the corpora reach of their decoders: branches and lines, as a table
   docs                         check the links and file names in README.md and docs/; make the API reference in build/docs
@@ -257,9 +258,15 @@ verb_faults() {
     supervisor) filter='*.StartedAgain*' ;;
     flood) filter='Flood.*' ;;
     soak) filter='Soak.*' ;;
-    *) fail "no fault '$fault'; there are: all kill power disk rights descriptors memory clock publishers second reader supervisor flood soak" ;;
+    packets) filter= ;;
+    *) fail "no fault '$fault'; there are: all kill power disk rights descriptors memory clock publishers second reader supervisor flood soak packets" ;;
   esac
   [[ $seconds =~ ^[0-9]*$ ]] || fail "how many seconds? not '$seconds'"
+  if [ "$fault" = packets ]; then
+    verb_build release prescene
+    timed "faults: packets" tools/packet_storm build/release "${seconds:-120}"  # of its own: how often Cyclone ends is measured, not judged
+    return
+  fi
   verb_build release prescene system_flood_tests
   timed "faults: $fault" env PRESCENE_FAULTS=full "PRESCENE_SOAK_SECONDS=${seconds:-180}" "PRESCENE_FLOOD_SECONDS=${seconds:-30}" \
     build/release/tests/system_flood_tests "--gtest_filter=$filter" --gtest_brief=1
