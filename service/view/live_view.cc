@@ -195,8 +195,20 @@ void LiveView::Impl::show(const ShownStep& shown) {
   interfaces::WebMessagePtr new_history;
   {
     const std::lock_guard lock(shown_mutex);
+    const std::size_t runs = history.runs().size();
     history.add(summary, index);
-    if (history.revision() != revision) new_history = view_text(to_json(history), WebDelivery::kEach);
+    ordered_json new_runs = ordered_json::array();
+    for (std::size_t i = runs; i < history.runs().size(); ++i) new_runs.push_back(to_json(history.runs()[i]));
+    if (history.revision() != revision) {
+      new_history = view_text(to_json(history), WebDelivery::kEach);
+    } else if (!new_runs.empty()) {  // a page makes the rows from the steps, of which it may miss some
+      new_history = view_text(JsonFields()
+                                  .text("op", "rows")
+                                  .field("rows", ordered_json::array())
+                                  .field("runs", std::move(new_runs))
+                                  .take(),
+                              WebDelivery::kEach);
+    }
     revision = history.revision();
   }
   if (new_history) server->send_to_all(new_history);

@@ -14,6 +14,7 @@ PRESCENE_PAGE_FILE(kPrescenePageIndex, "index.html");
 PRESCENE_PAGE_FILE(kPrescenePageStyle, "view.css");
 PRESCENE_PAGE_FILE(kPrescenePageView, "view.js");
 PRESCENE_PAGE_FILE(kPrescenePagePanels, "panels.js");
+PRESCENE_PAGE_FILE(kPrescenePageBands, "bands.js");
 PRESCENE_PAGE_FILE(kPrescenePageScene, "scene3d.js");
 PRESCENE_PAGE_FILE(kPrescenePageDrawing, "drawing.js");
 
@@ -26,6 +27,7 @@ std::vector<interfaces::WebFile> page_files() {
           {"/view.css", "text/css; charset=utf-8", {kPrescenePageStyleBegin, kPrescenePageStyleEnd}},
           {"/view.js", script, {kPrescenePageViewBegin, kPrescenePageViewEnd}},
           {"/panels.js", script, {kPrescenePagePanelsBegin, kPrescenePagePanelsEnd}},
+          {"/bands.js", script, {kPrescenePageBandsBegin, kPrescenePageBandsEnd}},
           {"/scene3d.js", script, {kPrescenePageSceneBegin, kPrescenePageSceneEnd}},
           {"/drawing.js", script, {kPrescenePageDrawingBegin, kPrescenePageDrawingEnd}}};
 }

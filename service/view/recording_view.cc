@@ -38,7 +38,7 @@ struct RecordingView::Impl {
   WebMessagePtr scene;
   ViewHistory history;
   std::uint64_t revision = 0;
-  ordered_json new_rows = ordered_json::array();
+  ordered_json new_rows = ordered_json::array(), new_runs = ordered_json::array();
   std::vector<int> cameras;  // whose frame each step is of
   struct Strip {
     std::uint64_t number;  // of the frames that strips are made of
@@ -218,7 +218,10 @@ core::Status RecordingView::Impl::add(const ShownStep& given) {
   ordered_json document = step_document(step, summary, index);
   {
     const std::lock_guard lock(mutex);
+    const std::size_t runs = history.runs().size();
     if (history.add(summary, index)) new_rows.push_back(to_json(history.rows().back()));
+    // Where runs were taken away, all are sent anew.
+    for (std::size_t i = runs; i < history.runs().size(); ++i) new_runs.push_back(to_json(history.runs()[i]));
     document["time"] = history.seconds_of(summary.stamp_ns);
     beliefs.add(index, step.belief);
     cameras.push_back(camera);
@@ -264,10 +267,13 @@ void RecordingView::Impl::send_news() {
     revision = history.revision();
     if (anew) {
       rows = view_text(to_json(history), WebDelivery::kEach);
-    } else if (!new_rows.empty()) {
-      rows = view_text(JsonFields().text("op", "rows").field("rows", std::move(new_rows)).take(), WebDelivery::kEach);
+    } else if (!new_rows.empty() || !new_runs.empty()) {
+      rows = view_text(
+          JsonFields().text("op", "rows").field("rows", std::move(new_rows)).field("runs", std::move(new_runs)).take(),
+          WebDelivery::kEach);
     }
     new_rows = ordered_json::array();
+    new_runs = ordered_json::array();
     news = view_text(extent(), WebDelivery::kEach);
   }
   if (rows) server->send_to_all(rows);

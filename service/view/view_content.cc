@@ -139,6 +139,7 @@ ordered_json object_document(const ObjectSummary& summary, const belief::ObjectB
   JsonFields document;
   document.text("name", summary.name)
       .text("state", belief::to_string(summary.state))
+      .field("held_by", summary.held_by ? ordered_json(*summary.held_by) : ordered_json())
       .number("confidence", rounded(summary.confidence, 1e4))
       .number("existence", rounded(summary.existence, 1e4))
       .field("pose", pose_numbers(summary.X_WO))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/view/view_history.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -33,8 +34,15 @@ bool ViewHistory::add(const BeliefSummary& summary, std::uint64_t index) {
     seen_ = 0;
     first_ns_ = summary.stamp_ns;
     ++revision_;
+    objects_.clear();
+    for (const ObjectSummary& object : summary.objects) objects_.push_back(object.name);
+    runs_.clear();
+    current_.clear();
+    shortest_run_ = 0.0;
+    joined_ = 0;
   }
   last_ns_ = summary.stamp_ns;
+  add_runs(summary, index);
   if (seen_++ % stride_ != 0) return false;
   if (rows_.size() >= most_rows_) {
     std::size_t kept = 0;
@@ -55,6 +63,46 @@ bool ViewHistory::add(const BeliefSummary& summary, std::uint64_t index) {
   return true;
 }
 
+void ViewHistory::add_runs(const BeliefSummary& summary, std::uint64_t index) {
+  for (std::size_t i = 0; i < summary.objects.size(); ++i) {
+    const ObjectSummary& object = summary.objects[i];
+    const std::string held_by = object.held_by.value_or("");
+    if (i < current_.size() && current_[i] == std::pair(object.state, held_by)) continue;
+    if (i == current_.size()) current_.emplace_back();
+    current_[i] = {object.state, held_by};
+    runs_.push_back({i, index, seconds_of(summary.stamp_ns), object.state, held_by});
+  }
+  if (runs_.size() > std::max(most_runs_, 2 * objects_.size())) join_short_runs();
+}
+
+void ViewHistory::join_short_runs() {
+  constexpr double kFirst = 0.1;  // s: three frames of a usual camera
+  ++revision_;
+  const std::size_t most = std::max(most_runs_ / 2, 2 * objects_.size());  // the first and the last of each stay
+  while (runs_.size() > most) {
+    shortest_run_ = shortest_run_ > 0.0 ? 2.0 * shortest_run_ : kFirst;
+    std::vector<Run> kept;
+    for (std::size_t object = 0; object < objects_.size(); ++object) {
+      std::vector<Run> own;
+      for (Run& run : runs_)
+        if (run.object == object) own.push_back(std::move(run));
+      const std::size_t first = kept.size();
+      for (std::size_t i = 0; i < own.size(); ++i) {
+        const bool is_short = i > 0 && i + 1 < own.size() && own[i + 1].time - own[i].time < shortest_run_;
+        const bool is_as_before =
+            kept.size() > first && kept.back().state == own[i].state && kept.back().held_by == own[i].held_by;
+        if (is_short || is_as_before) {
+          ++joined_;
+        } else {
+          kept.push_back(std::move(own[i]));
+        }
+      }
+    }
+    std::stable_sort(kept.begin(), kept.end(), [](const Run& a, const Run& b) { return a.index < b.index; });
+    runs_ = std::move(kept);
+  }
+}
+
 nlohmann::ordered_json to_json(const ViewHistory::Row& row) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   json.push_back(row.index);
@@ -63,10 +111,30 @@ nlohmann::ordered_json to_json(const ViewHistory::Row& row) {
   return json;
 }
 
+nlohmann::ordered_json to_json(const ViewHistory::Run& run) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  json.push_back(run.object);
+  json.push_back(run.index);
+  json.push_back(std::round(run.time * 1e4) / 1e4);
+  json.push_back(belief::to_string(run.state));
+  json.push_back(run.held_by.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(run.held_by));
+  return json;
+}
+
 nlohmann::ordered_json to_json(const ViewHistory& history) {
+  nlohmann::ordered_json runs = nlohmann::ordered_json::array();
+  for (const ViewHistory::Run& run : history.runs()) runs.push_back(to_json(run));
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (const ViewHistory::Row& row : history.rows()) rows.push_back(to_json(row));
-  return JsonFields().text("op", "history").texts("columns", history.columns()).field("rows", std::move(rows)).take();
+  return JsonFields()
+      .text("op", "history")
+      .texts("columns", history.columns())
+      .field("rows", std::move(rows))
+      .texts("objects", history.objects())
+      .field("runs", std::move(runs))
+      .number("shortest_run", history.shortest_run())
+      .count("joined_runs", history.joined_runs())
+      .take();
 }
 
 }  // namespace prescene::service

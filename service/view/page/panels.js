@@ -9,6 +9,35 @@ export function make(tag, properties = {}, ...children) {
   return node;
 }
 
+// Copies what `text` returns. Where the page is no secure context, browsers have no clipboard for it.
+async function copyText(text) {
+  try { await navigator.clipboard.writeText(text); return true; } catch { /* the old way, then */ }
+  const area = make('textarea', { value: text });
+  document.body.append(area);
+  area.select();
+  let done = false;
+  try { done = document.execCommand('copy'); } catch { /* it says that it did not */ }
+  area.remove();
+  return done;
+}
+export function copyButton(label, title, text) {
+  const button = make('button', { className: 'copy', title, textContent: label, type: 'button' });
+  button.addEventListener('click', async (e) => {
+    e.stopPropagation();
+    button.textContent = await copyText(text()) ? 'copied' : 'not copied';
+    setTimeout(() => { button.textContent = label; }, 1500);
+  });
+  return button;
+}
+// A name that a table's program would take for a formula gets an apostrophe.
+const csvName = (name) => '"' + (/^[=+\-@\t\r]/.test(name) ? "'" : '') + name.replaceAll('"', '""') + '"';
+// Lines as {name, points: [[t, value, deviation?]...]}, all with the same times.
+export function csvOf(lines) {
+  const columns = lines.flatMap(({ name, points }) => points.length && points[0].length > 2 ? [name, name + ' deviation'] : [name]);
+  const rows = lines.length ? lines[0].points.map(([t], i) => [t, ...lines.flatMap(({ points }) => points[i].slice(1))]) : [];
+  return [['time', ...columns].map(csvName), ...rows].map((row) => row.join(',')).join('\n') + '\n';
+}
+
 const units = { friction: '', restitution: '', mass: ' kg', impact_friction: '' };
 const unitOf = (name) => units[name] ?? (name.startsWith('center_of_mass') ? ' m' : '');
 const percent = (p) => (100 * p).toFixed(p > 0 && p < 0.01 ? 1 : 0) + ' %';
@@ -52,6 +81,7 @@ export class ObjectList {
       const lines = [['confidence', percent(object.confidence)]];
       if (chosen) {
         const p = object.pose;
+        if (object.held_by) lines.push(['held by', object.held_by]);
         lines.push(['position', p.slice(0, 3).map((c) => (100 * c).toFixed(1)).join(', ') + ' cm'],
           ['spread', (1000 * object.spread).toFixed(1) + ' mm'], ['speed', object.speed.toFixed(2) + ' m/s'],
           ['in view', percent(object.visible_share)], ['existence', percent(object.existence)]);
@@ -72,14 +102,16 @@ export class ObjectList {
 class Chart {
   constructor(title, onSeek) {
     this.value = make('b');
+    this.lines = [];
+    const copy = copyButton('CSV', 'Copy the curve', () => csvOf(this.lines));
     this.canvas = make('canvas');
-    this.root = make('figure', { className: 'chart' }, make('figcaption', {}, make('span', { textContent: title }), this.value), this.canvas);
+    this.root = make('figure', { className: 'chart' }, make('figcaption', {}, make('span', { textContent: title }), make('span', {}, this.value, ' ', copy)), this.canvas);
     this.canvas.addEventListener('click', (e) => { if (this.range) onSeek(this.range[0] + (e.offsetX - this.left) / (this.canvas.clientWidth - this.left - 4) * (this.range[1] - this.range[0])); });
     this.left = 40;
   }
-  // lines: [{color, points: [[t, value, deviation?]...], dashed}]
+  // lines: [{name, color, points: [[t, value, deviation?]...], dashed}]
   draw(lines, range, now, limits, dark) {
-    this.range = range;
+    Object.assign(this, { range, lines });
     const ratio = Math.min(2, devicePixelRatio || 1), { canvas, left } = this, w = canvas.clientWidth, h = canvas.clientHeight;
     if (!w) return;
     if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) { canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio); }
@@ -182,8 +214,8 @@ export class Trends {
     for (const [title, parameter] of wanted) {
       const chart = this.charts.get(title);
       const lines = parameter
-        ? [{ color: colors.get(object.name), points: this.points(object.name + '/' + parameter.name, true) }]
-        : step.objects.map((o) => ({ color: colors.get(o.name), points: this.points(o.name + '/confidence'), dashed: o.name !== selected && step.objects.length > 1 }));
+        ? [{ name: title, color: colors.get(object.name), points: this.points(object.name + '/' + parameter.name, true) }]
+        : step.objects.map((o) => ({ name: o.name, color: colors.get(o.name), points: this.points(o.name + '/confidence'), dashed: o.name !== selected && step.objects.length > 1 }));
       chart.value.textContent = parameter ? parameter.mean.toFixed(3) + ' ± ' + parameter.deviation.toFixed(3) + unitOf(parameter.name) : object ? percent(object.confidence) : '';
       chart.draw(lines, range, step.time, parameter ? null : [0, 1], dark);
     }

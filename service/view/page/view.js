@@ -3,7 +3,8 @@
 
 import { seriesColor, css } from './drawing.js';
 import { OverlayView, SpaceView } from './scene3d.js';
-import { ObjectList, Trends, answerContent, make, shownEnds } from './panels.js';
+import { ObjectList, Trends, answerContent, copyButton, make, shownEnds } from './panels.js';
+import { Bands, bandKey } from './bands.js';
 
 const $ = (id) => document.getElementById(id);
 const page = {
@@ -19,6 +20,8 @@ const space = new SpaceView($('space'), $('labels'), (x, y) => { const name = pa
 const overlay = new OverlayView($('outlines'));
 const list = new ObjectList($('object-list'), select);
 const trends = new Trends($('charts'), (index) => seek(index));
+const bands = new Bands({ root: $('bands'), details: $('happened'), list: $('events'), onSeek: (index) => seek(index), onSelect: select });
+$('happened').append(bandKey());
 const photo = $('photo').getContext('2d');
 if (!space.works) $('labels').replaceChildren(make('p', { className: 'hint', textContent: 'This browser has no WebGL 2: the scene is not drawn' }));
 
@@ -64,8 +67,8 @@ const receivers = {
     overlay.setScene(scene);
     redraw();
   },
-  history({ columns, rows }) { trends.setHistory(columns, rows); redraw(); },
-  rows({ rows }) { trends.addRows(rows); redraw(); },
+  history(history) { trends.setHistory(history.columns, history.rows); bands.set(history); redraw(); },
+  rows({ rows, runs }) { trends.addRows(rows); if (runs && runs.length) bands.add(runs); redraw(); },
   step(step) {
     page.waitingFor = null;
     if (page.mode === 'live') {
@@ -170,6 +173,8 @@ function redraw() {
     else overlay.clear();
     list.show(step.objects, page.colors, page.selected);
     trends.show(step, page.colors, page.selected, dark());
+    const isLive = page.mode === 'live';
+    bands.draw({ index: step.index, steps: page.steps, first: isLive && trends.rows.length ? trends.rows[0][0] : 0, selected: page.selected, dark: dark(), fixed: isLive });
     $('scrub').value = page.mode === 'live' ? $('scrub').max : step.index;
     $('clock').textContent = step.time.toFixed(2) + ' s, step ' + step.step;
   });
@@ -244,6 +249,10 @@ function setPlaying(playing) {
   };
   requestAnimationFrame(tick);
 }
+const toChange = (direction) => {
+  const event = page.step && page.mode !== 'live' && bands.neighbour(page.wanted ?? page.step.index, direction);
+  if (event) { select(bands.objects[event.object]); seek(event.index); }
+};
 const move = (steps) => { if (page.step && page.mode !== 'live') seek(page.step.index + steps); };
 
 // --- questions
@@ -264,6 +273,7 @@ function showAnswer(number, answer) {
   if (!of) return;
   of.answer = answer;
   while (of.element.children.length > 1) of.element.lastChild.remove();
+  of.element.firstElementChild.append(copyButton('JSON', 'Copy the answer', () => JSON.stringify(answer, null, 2)));
   try { of.element.append(...answerContent(answer)); } catch (error) { of.element.append(make('p', { className: 'bad', textContent: 'The answer has another form than expected: ' + error.message })); }
   if (answer.step !== undefined && page.step && answer.step !== page.step.step && page.mode === 'recording')
     of.element.append(make('p', { textContent: 'Of the belief at step ' + answer.step }));
@@ -328,7 +338,7 @@ const keys = {
   ' ': () => setPlaying(!page.playing), ArrowLeft: (e) => move(e.shiftKey ? -10 : -1), ArrowRight: (e) => move(e.shiftKey ? 10 : 1),
   Home: () => seek(0), End: () => seek(page.steps - 1), g: () => toggle('ghosts'), o: () => toggle('overlay'), f: whole, c: fromCamera,
   v: () => { if (page.cameras.length > 1) setCamera((page.camera + 1) % page.cameras.length); },
-  t: swapTheme, w: questions.where, s: questions.stays, r: questions.release, '?': () => $('keys').showModal(),
+  n: () => toChange(1), p: () => toChange(-1), t: swapTheme, w: questions.where, s: questions.stays, r: questions.release, '?': () => $('keys').showModal(),
 };
 addEventListener('keydown', (e) => {
   if (e.ctrlKey || e.altKey || e.metaKey || e.target.closest('textarea, select, dialog')) return;

@@ -38,6 +38,9 @@ TEST(RecordingView, ShowsStepsInAnyOrder) {
   const ordered_json history = page.next("history");
   EXPECT_EQ(history["columns"][0], "box/state");
   EXPECT_EQ(history["rows"].size(), 5U);
+  EXPECT_EQ(history["objects"][0], "box");
+  ASSERT_EQ(history["runs"].size(), 1U);
+  EXPECT_EQ(history["runs"][0][1], 0);
   const ordered_json extent = page.next("extent");
   EXPECT_EQ(extent["steps"], 5);
   EXPECT_EQ(extent["done"], true);

@@ -93,5 +93,55 @@ TEST(ViewHistory, BeginsAnewWhereTheClockWentBack) {
   EXPECT_NE(history.revision(), revision);
 }
 
+BeliefSummary state_at(std::uint64_t step, belief::TrackState state, const std::string& held_by = "") {
+  BeliefSummary summary = summary_at(step);
+  summary.objects[0].state = state;
+  if (!held_by.empty()) summary.objects[0].held_by = held_by;
+  return summary;
+}
+
+// A state of a single step, of which no row is kept, is in the runs.
+TEST(ViewHistory, NoChangeIsLostWithTheRows) {
+  using belief::TrackState;
+  ViewHistory history(100);
+  for (std::uint64_t i = 0; i < 1000; ++i)
+    history.add(state_at(i, i == 501 ? TrackState::kLost : TrackState::kTracked, i >= 700 ? "gripper" : ""), i);
+  ASSERT_EQ(history.runs().size(), 4U);
+  EXPECT_EQ(history.runs()[1].index, 501U);
+  EXPECT_EQ(history.runs()[1].state, TrackState::kLost);
+  EXPECT_NEAR(history.runs()[1].time, 50.1, 1e-9);
+  EXPECT_EQ(history.runs()[2].index, 502U);
+  EXPECT_EQ(history.runs()[3].held_by, "gripper");
+  EXPECT_EQ(belief::json_text(to_json(history.runs()[3])), R"([0,700,70.0,"tracked","gripper"])");
+  EXPECT_EQ(history.joined_runs(), 0U);
+}
+
+// Whatever the states do: the runs are bounded, the first and the state that holds now are right, no two in a row are
+// equal, and each that changed is either there or counted.
+TEST(ViewHistory, RunsAreBoundedAndCounted) {
+  constexpr std::size_t kMost = 50;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    core::RandomStream stream(seed, core::Purpose::kTest, 0, 0);
+    ViewHistory history(100, kMost);
+    std::uint64_t began = 0;
+    auto state = belief::TrackState::kTracked;
+    for (std::uint64_t i = 0; i < 2000; ++i) {
+      const auto before = state;
+      if (stream.uniform() < 0.02 * static_cast<double>(seed))
+        state = static_cast<belief::TrackState>(static_cast<int>(4.0 * stream.uniform()));
+      began += i == 0 || state != before ? 1 : 0;
+      history.add(state_at(i, state), i);
+      ASSERT_LE(history.runs().size(), kMost);
+      ASSERT_EQ(history.runs().back().state, state);
+    }
+    EXPECT_EQ(history.runs().front().index, 0U);
+    EXPECT_EQ(history.runs().size() + history.joined_runs(), began);
+    for (std::size_t i = 1; i < history.runs().size(); ++i) {
+      EXPECT_NE(history.runs()[i].state, history.runs()[i - 1].state);
+      EXPECT_LT(history.runs()[i - 1].index, history.runs()[i].index);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace prescene::service::view_content_test

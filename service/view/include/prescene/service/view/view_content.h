@@ -35,12 +35,12 @@ nlohmann::ordered_json scene_document(const belief::Scene& scene);
 /// Equal for scenes whose documents differ in poses at most, which steps contain.
 std::uint64_t scene_shape_hash(const belief::Scene& scene);
 
-/// {"op": "step", "index", "step", "stamp_ns", "objects": [{"name", "state", "confidence", "existence", "pose",
-/// "spread" (m, standard deviation of the position), "speed", "visible_share", "parameters", "lessons", "ghosts":
-/// [pose...] (particles by weight, at most 24, without those near the mean), "region": [x, y, z, ...] (positions drawn
-/// from the belief, only where the object is not tracked)}], "camera": {"pose", "width", "height", "fx", "fy", "cx",
-/// "cy"}, "cameras" (of several; the same by number, null where a camera has given no frame), "robot": [pose...],
-/// "supports": [pose...], "seconds", "degraded"}
+/// {"op": "step", "index", "step", "stamp_ns", "objects": [{"name", "state", "held_by" (the hand, or null),
+/// "confidence", "existence", "pose", "spread" (m, standard deviation of the position), "speed", "visible_share",
+/// "parameters", "lessons", "ghosts": [pose...] (particles by weight, at most 24, without those near the mean),
+/// "region": [x, y, z, ...] (positions drawn from the belief, only where the object is not tracked)}], "camera":
+/// {"pose", "width", "height", "fx", "fy", "cx", "cy"}, "cameras" (of several; the same by number, null where a camera
+/// has given no frame), "robot": [pose...], "supports": [pose...], "seconds", "degraded"}
 nlohmann::ordered_json step_document(const ShownStep& step, const BeliefSummary& summary, std::uint64_t index);
 
 /// The camera's picture as a JPEG of at most `most_width` pixels across, made smaller by a whole factor.

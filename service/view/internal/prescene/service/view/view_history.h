@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Confidence, state and learned parameters of each object over time, in bounded memory: of a long run every second
-// row, then every fourth, and so on.
+// row, then every fourth, and so on. When each state began is kept apart from the rows, so that no change is lost with
+// them.
 #pragma once
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "prescene/service/belief_summary.h"
@@ -15,12 +17,21 @@ namespace prescene::service {
 /// Not thread-safe.
 class ViewHistory {
  public:
-  explicit ViewHistory(std::size_t most_rows = 4000) : most_rows_(most_rows) {}
+  explicit ViewHistory(std::size_t most_rows = 4000, std::size_t most_runs = 4000)
+      : most_rows_(most_rows), most_runs_(most_runs) {}
 
   struct Row {
     std::uint64_t index = 0;
     double time = 0.0;  ///< s since the first row's stamp.
     std::vector<double> values;
+  };
+  /// An object's state from a step on, until its next run begins or the history ends.
+  struct Run {
+    std::size_t object = 0;  ///< As objects() has them.
+    std::uint64_t index = 0;
+    double time = 0.0;  ///< s, as a row's.
+    belief::TrackState state = belief::TrackState::kTracked;
+    std::string held_by;  ///< The hand; "" = free.
   };
   /// Takes a step in; false where it was left out, as its neighbours stand for it. Other objects or parameters than
   /// before, or a stamp before the last, begin anew (columns() changes).
@@ -30,21 +41,36 @@ class ViewHistory {
   /// each parameter "NAME/PARAMETER" and "NAME/PARAMETER/deviation".
   const std::vector<std::string>& columns() const { return columns_; }
   const std::vector<Row>& rows() const { return rows_; }
-  /// Changes whenever rows were taken away: who kept a copy needs a new one.
+  const std::vector<std::string>& objects() const { return objects_; }
+  /// In the order in which they began. Of more than `most_runs`, those that are shorter than shortest_run() are joined
+  /// to what went before; joined_runs() counts them.
+  const std::vector<Run>& runs() const { return runs_; }
+  double shortest_run() const { return shortest_run_; }  ///< s; 0 = none was joined.
+  std::uint64_t joined_runs() const { return joined_; }
+  /// Changes whenever rows or runs were taken away: who kept a copy needs a new one.
   std::uint64_t revision() const { return revision_; }
   double seconds_of(core::TimeNs stamp_ns) const { return 1e-9 * static_cast<double>(stamp_ns - first_ns_); }
 
  private:
-  std::size_t most_rows_;
-  std::vector<std::string> columns_;
+  void add_runs(const BeliefSummary& summary, std::uint64_t index);
+  void join_short_runs();
+
+  std::size_t most_rows_, most_runs_;
+  std::vector<std::string> columns_, objects_;
   std::vector<Row> rows_;
+  std::vector<Run> runs_;
+  std::vector<std::pair<belief::TrackState, std::string>> current_;  // of each object: state and hand
+  double shortest_run_ = 0.0;
+  std::uint64_t joined_ = 0;
   std::uint64_t stride_ = 1, seen_ = 0, revision_ = 0;
   core::TimeNs first_ns_ = 0, last_ns_ = 0;
 };
 
 /// [index, time, values...]
 nlohmann::ordered_json to_json(const ViewHistory::Row& row);
-/// {"op": "history", "columns", "rows"}
+/// [object's place, index, time, state, held_by], with null for a free one
+nlohmann::ordered_json to_json(const ViewHistory::Run& run);
+/// {"op": "history", "columns", "rows", "objects", "runs", "shortest_run", "joined_runs"}
 nlohmann::ordered_json to_json(const ViewHistory& history);
 
 }  // namespace prescene::service
