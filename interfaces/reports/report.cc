@@ -38,6 +38,8 @@ figcaption, caption { color: var(--soft); font-size: 0.88rem; text-align: left; 
 .pictures figure { flex: 1 1 380px; max-width: 100%; }
 .pictures img { width: 100%; height: auto; border-radius: 6px; display: block; }
 .pixelated { image-rendering: pixelated; }
+iframe.page { width: min(96vw, 1600px); margin-left: calc(50% - min(48vw, 800px)); height: min(92vh, 62rem); border: 1px solid var(--line);
+  border-radius: 10px; display: block; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; margin: 0 0 1.2rem; font-variant-numeric: tabular-nums; }
 th { text-align: left; font-size: 0.8rem; color: var(--soft); font-weight: 600; }
@@ -57,7 +59,7 @@ svg .bar { fill: var(--accent); }
 svg .whisker { stroke: var(--ink); stroke-width: 1.5; }
 svg .outline { fill: none; stroke: #ffffff; stroke-width: 1.5; stroke-opacity: 0.85; }
 footer { color: var(--soft); font-size: 0.82rem; margin-top: 2rem; }
-@media print { body { background: none; } section { break-inside: avoid; } }
+@media print { iframe.page { display: none; } body { background: none; } section { break-inside: avoid; } }
 )css";
 
 constexpr std::string_view kEnd = "<footer>Made by Prescene.</footer>\n</main>\n</body>\n</html>\n";
@@ -169,6 +171,30 @@ std::string html_of(const StateBandBlock& block) {
 }
 std::string html_of(const HeatMapBlock& block) { return figure(heat_map_svg(block) + "\n", block.caption); }
 
+/// In an attribute. What is in it is as large as a page can be, so that quotes, of which it is full, stay as they are.
+std::string html_of(const PageBlock& block) {
+  if (block.html.empty()) return "";
+  std::string document;
+  document.reserve(block.html.size() + block.html.size() / 16);
+  for (const char c : block.html) {
+    switch (c) {
+      case '&':
+        document += "&amp;";
+        break;
+      case '<':
+        document += "&lt;";
+        break;
+      case '\'':
+        document += "&#39;";
+        break;
+      default:
+        document += c;
+    }
+  }
+  return figure("<iframe class=\"page\" title=\"" + escaped(block.caption) + "\" srcdoc='" + document + "'></iframe>\n",
+                block.caption);
+}
+
 std::string html_of(const ReportSection& section) {
   std::string out = "<section>\n";
   if (!section.title.empty()) out += "<h2>" + escaped(section.title) + "</h2>\n";
@@ -177,14 +203,29 @@ std::string html_of(const ReportSection& section) {
   return out + "</section>\n";
 }
 
+/// " script-src 'sha256-...';" for those that the pages in the report run; "" where none does.
+std::string script_policy(const ReportContents& contents) {
+  std::string policy;
+  for (const ReportSection& section : contents.sections) {
+    for (const ReportBlock& block : section.blocks) {
+      const auto* page = std::get_if<PageBlock>(&block);
+      if (page == nullptr || page->html.empty()) continue;
+      for (const std::string& hash : page->script_hashes) policy += " 'sha256-" + escaped(hash) + "'";
+    }
+  }
+  return policy.empty() ? "" : " script-src" + policy + ";";
+}
+
 }  // namespace
 
 std::string report_html(const ReportContents& contents) {
   // The policy keeps the promise that nothing is loaded or run, should a text ever slip through unescaped.
   std::string out =
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; img-src "
-      "data:\"/>\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>" +
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none';" +
+      script_policy(contents) +
+      " style-src 'unsafe-inline'; img-src data:\"/>\n<meta name=\"viewport\" content=\"width=device-width, "
+      "initial-scale=1\"/>\n<title>" +
       escaped(contents.title) + "</title>\n<style>" + kStyle + "</style>\n</head>\n<body>\n<main>\n<header>\n<h1>" +
       escaped(contents.title) + "</h1>\n";
   if (!contents.subtitle.empty()) out += "<p class=\"subtitle\">" + escaped(contents.subtitle) + "</p>\n";

@@ -25,6 +25,7 @@
 #include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/topics.h"
 #include "prescene/service/training/proposals_file.h"
+#include "prescene/service/view/recorded_page.h"
 #include "relations_options.h"
 #include "replay_text.h"
 #include "verb.h"
@@ -281,6 +282,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   ExplainedAgain explained(input, options.input, settings, backends, context.cancellation());
   SessionReport report(input.scene(), settings, backends);
   report.set_proposals(options.proposals);
+  RecordedPage page({.title = std::filesystem::path(options.input).filename().string()});
   ordered_json steps = ordered_json::array();
   std::optional<core::TimeNs> first_ns;
   const StepSink on_step = [&](const TrackerStep& step, const Tracker& at) -> core::Status {
@@ -294,6 +296,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
       report.set_scene(at.belief()->scene);
       report.add(summary);
       report.add(step.observation);
+      page.add({at.belief(), step.observation, step.record.seconds, step.record.degraded});
     }
     const std::vector<SupportFrame> support_frames = supports.add(summary.stamp_ns, step.supports);
     if (!context.options().json) return core::ok_status();  // Long recordings have many steps.
@@ -309,7 +312,10 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   std::optional<HappenedRecord> happened;
   const JsonSink on_json = [&](const std::string& topic, const std::string& json,
                                core::TimeNs time_ns) -> core::Status {
-    if (topic == kAnswerTopic) return explained.add_answer(json, time_ns);
+    if (topic == kAnswerTopic) {
+      if (!options.report.empty()) page.add_answer(json);
+      return explained.add_answer(json, time_ns);
+    }
     if (topic == kTruthTopic) {
       const auto truth = truth_from_json(json);
       if (truth)
@@ -338,6 +344,7 @@ core::Status run_here(ReplayOptions& options, VerbContext& context) {
   ordered_json support_rows = ordered_json::array();
   for (const SupportRow& row : supports.rows()) support_rows.push_back(to_json(row));
   if (!options.report.empty()) {
+    report.set_page(page.page());
     PRESCENE_RETURN_IF_ERROR(report.write(options.report, score));
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }

@@ -283,6 +283,7 @@ core::Status SessionReport::write(const std::filesystem::path& path, const Track
                     {"objects", std::to_string(scene_->objects.size())},
                     {"supports", std::to_string(scene_->supports.size())}};
   if (!proposals_.empty()) contents.facts.push_back({"proposals", proposals_});
+  if (!page_.html.empty()) contents.sections.push_back({"The session, step by step", {page_}});
   interfaces::ReportSection seen{"What the camera saw, with the belief drawn in", {pictures()}};
   contents.sections.push_back(std::move(seen));
   add_changes(contents);

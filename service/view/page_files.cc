@@ -15,6 +15,7 @@ PRESCENE_PAGE_FILE(kPrescenePageStyle, "view.css");
 PRESCENE_PAGE_FILE(kPrescenePageView, "view.js");
 PRESCENE_PAGE_FILE(kPrescenePagePanels, "panels.js");
 PRESCENE_PAGE_FILE(kPrescenePageBands, "bands.js");
+PRESCENE_PAGE_FILE(kPrescenePageRecorded, "recorded.js");
 PRESCENE_PAGE_FILE(kPrescenePageScene, "scene3d.js");
 PRESCENE_PAGE_FILE(kPrescenePageDrawing, "drawing.js");
 
@@ -28,6 +29,7 @@ std::vector<interfaces::WebFile> page_files() {
           {"/view.js", script, {kPrescenePageViewBegin, kPrescenePageViewEnd}},
           {"/panels.js", script, {kPrescenePagePanelsBegin, kPrescenePagePanelsEnd}},
           {"/bands.js", script, {kPrescenePageBandsBegin, kPrescenePageBandsEnd}},
+          {"/recorded.js", script, {kPrescenePageRecordedBegin, kPrescenePageRecordedEnd}},
           {"/scene3d.js", script, {kPrescenePageSceneBegin, kPrescenePageSceneEnd}},
           {"/drawing.js", script, {kPrescenePageDrawingBegin, kPrescenePageDrawingEnd}}};
 }

@@ -222,14 +222,14 @@ export class Trends {
   }
 }
 
-// Colour of each outcome, by its place in its group: the same in bars and in the scene.
+// Colour of each outcome, by its place in its group: the same in bars, in the scene and in the reports.
 const outcomeKey = ({ group, name, outcome }) => (group ?? '') + '/' + (name ?? outcome);
 function outcomeColors(predict) {
   const places = new Map(), colors = new Map();
   for (const outcome of predict.outcomes) {
     const place = places.get(outcome.group) ?? 0;
     places.set(outcome.group, place + 1);
-    colors.set(outcomeKey(outcome), seriesColor(place));
+    colors.set(outcomeKey(outcome), seriesColor(place + 1));
   }
   return colors;
 }
@@ -265,7 +265,7 @@ export function answerContent(answer) {
     for (const { object, state, estimate } of where.items)
       note(`${object}: ${state}, ${percent(estimate.confidence)} sure, at ${estimate.mean.position.map((c) => (100 * c).toFixed(1)).join(', ')} cm`);
   } else if (stability) {
-    nodes.push(outcomeRow({ ...stability.stable, name: stability.object + ' stays' }, seriesColor(2)));
+    nodes.push(outcomeRow({ ...stability.stable, name: stability.object + ' stays' }, seriesColor(1)));
     if (stability.likely_event) note('Otherwise: ' + stability.likely_event);
   } else if (predict) {
     const colors = outcomeColors(predict);

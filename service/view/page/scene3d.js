@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws the scene with WebGL: in space, and as outlines over the camera's picture.
 
-import { cross, css, inverseRigid, lookAt, multiply, normalized, perspective, pinhole, poseMatrix, scale, seriesColor,
-  sub, add, transform, warmColor, warmOpacity } from './drawing.js';
+import { cross, css, inverseRigid, lookAt, multiply, normalized, perspective, pinhole, poseMatrix, scale, seriesColor, sub, add, transform, warmColor, warmOpacity } from './drawing.js';
 
 const meshVertex = `#version 300 es
 in vec3 position; in vec3 normal; uniform mat4 toClip; uniform mat4 toWorld; out vec3 n;

@@ -5,6 +5,7 @@ import { seriesColor, css } from './drawing.js';
 import { OverlayView, SpaceView } from './scene3d.js';
 import { ObjectList, Trends, answerContent, copyButton, make, shownEnds } from './panels.js';
 import { Bands, bandKey } from './bands.js';
+import { RecordedProgram } from './recorded.js';
 
 const $ = (id) => document.getElementById(id);
 const page = {
@@ -27,7 +28,11 @@ if (!space.works) $('labels').replaceChildren(make('p', { className: 'hint', tex
 
 // --- talking to the program
 
+// In a report, the file stands for the program.
+const recorded = $('recorded') && new RecordedProgram(JSON.parse($('recorded').textContent), take, takePicture);
+
 function connect() {
+  if (recorded) return openRecorded();
   socket = new WebSocket((location.protocol === 'https:' ? 'wss://' : 'ws://') + location.host + '/', 'prescene.view.v1');
   socket.binaryType = 'arraybuffer';
   socket.onopen = () => { retry = 500; setState('connected', 'good'); };
@@ -39,7 +44,21 @@ function connect() {
   };
   socket.onmessage = ({ data }) => typeof data === 'string' ? take(JSON.parse(data)) : takePicture(data);
 }
+function openRecorded() {
+  const remedy = 'Questions need the program: prescene view RECORDING';
+  for (const button of document.querySelectorAll('.asks button, #ask-own')) Object.assign(button, { disabled: true, title: remedy });
+  document.querySelector('#questions details').hidden = true;
+  if (!recorded.data.answers.length) $('answers').append(make('p', { textContent: remedy }));
+  recorded.open();
+  for (const { time, index, answer } of [...recorded.data.answers].reverse()) {
+    const kind = Object.keys(answer).find((key) => typeof answer[key] === 'object') ?? 'answer';
+    const number = addAnswer(kind, time.toFixed(2) + ' s');
+    asked.get(number).element.addEventListener('click', () => seek(index));
+    fillAnswer(number, answer);
+  }
+}
 function say(request) {
+  if (recorded) { if (request.op === 'show') recorded.show(request.index, request.camera); return; }
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(request));
 }
 function setState(text, kind) {
@@ -216,11 +235,13 @@ function drawStrip() {
 function request(index) {
   if (page.mode === 'live') return;
   index = Math.max(0, Math.min(page.steps - 1, index));
+  if (recorded) index = recorded.at(index);
   page.wanted = index;
   if (page.waitingFor !== null) return;
   page.waitingFor = index;
   say({ op: 'show', index, camera: page.camera });
 }
+const lastStep = () => recorded ? recorded.at(page.steps - 1) : page.steps - 1;
 function seek(index) {
   if (page.mode === 'live') return;
   setPlaying(false);
@@ -230,7 +251,7 @@ function setPlaying(playing) {
   page.playing = playing;
   $('play').textContent = playing ? 'Pause' : page.mode === 'live' ? 'Resume' : 'Play';
   if (!playing || page.mode === 'live') return;
-  if (page.step && page.step.index >= page.steps - 1) request(0);
+  if (page.step && page.step.index >= lastStep()) request(0);
   let last = performance.now(), time = page.step ? page.step.time : 0;
   const tick = (now) => {
     if (!page.playing || page.mode === 'live') return;
@@ -238,12 +259,13 @@ function setPlaying(playing) {
     last = now;
     if (page.waitingFor === null && page.step) {
       const at = page.step.index;
-      if (at >= page.steps - 1 && page.done) return setPlaying(false);
+      if (at >= lastStep() && page.done) return setPlaying(false);
       // The history says when each step was, so that speed is true to the recording.
       let next = trends.indexAt(time);
       if (next < at && time > page.step.time) next = at;
+      if (recorded) next = recorded.at(next);
       if (next !== at) request(next);
-      if (Math.abs(page.step.time - time) > 1) time = page.step.time;
+      if (Math.abs(page.step.time - time) > 1 && !recorded) time = page.step.time;
     }
     requestAnimationFrame(tick);
   };
@@ -253,28 +275,37 @@ const toChange = (direction) => {
   const event = page.step && page.mode !== 'live' && bands.neighbour(page.wanted ?? page.step.index, direction);
   if (event) { select(bands.objects[event.object]); seek(event.index); }
 };
-const move = (steps) => { if (page.step && page.mode !== 'live') seek(page.step.index + steps); };
+const move = (steps) => { if (page.step && page.mode !== 'live') seek(recorded ? recorded.at(page.step.index, steps) : page.step.index + steps); };
 
 // --- questions
 
-function ask(text, question) {
-  const number = nextNumber++, step = page.step;
-  const element = make('div', { className: 'answer' }, make('h3', {}, make('span', { textContent: text }), make('small', { textContent: step ? step.time.toFixed(2) + ' s' : '' })), make('p', { textContent: 'is being worked out ...' }));
+function addAnswer(text, when) {
+  const number = nextNumber++;
+  const element = make('div', { className: 'answer' }, make('h3', {}, make('span', { textContent: text }), make('small', { textContent: when })), make('p', { textContent: 'is being worked out ...' }));
   $('answers').prepend(element);
   while ($('answers').children.length > 20) $('answers').lastChild.remove();
   asked.set(number, { element, answer: null });
   element.addEventListener('click', () => showInScene(number));
+  return number;
+}
+function ask(text, question) {
+  if (recorded) return;
+  const step = page.step, number = addAnswer(text, step ? step.time.toFixed(2) + ' s' : '');
   const request = { op: 'ask', number, question };
   if (step && page.mode === 'recording') request.index = step.index;
   say(request);
 }
-function showAnswer(number, answer) {
+function fillAnswer(number, answer) {
   const of = asked.get(number);
-  if (!of) return;
   of.answer = answer;
   while (of.element.children.length > 1) of.element.lastChild.remove();
   of.element.firstElementChild.append(copyButton('JSON', 'Copy the answer', () => JSON.stringify(answer, null, 2)));
   try { of.element.append(...answerContent(answer)); } catch (error) { of.element.append(make('p', { className: 'bad', textContent: 'The answer has another form than expected: ' + error.message })); }
+}
+function showAnswer(number, answer) {
+  const of = asked.get(number);
+  if (!of) return;
+  fillAnswer(number, answer);
   if (answer.step !== undefined && page.step && answer.step !== page.step.step && page.mode === 'recording')
     of.element.append(make('p', { textContent: 'Of the belief at step ' + answer.step }));
   if (answer.predict) showInScene(number);

@@ -94,7 +94,10 @@ TEST(ViewHistory, BeginsAnewWhereTheClockWentBack) {
 }
 
 BeliefSummary state_at(std::uint64_t step, belief::TrackState state, const std::string& held_by = "") {
-  BeliefSummary summary = summary_at(step);
+  static const BeliefSummary kFirst = summary_at(0);
+  BeliefSummary summary = kFirst;
+  summary.step = step;
+  summary.stamp_ns += static_cast<core::TimeNs>(step) * 100'000'000;
   summary.objects[0].state = state;
   if (!held_by.empty()) summary.objects[0].held_by = held_by;
   return summary;

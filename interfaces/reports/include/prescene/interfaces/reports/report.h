@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reports: one self-contained HTML page for people who would rather look. Everything is inside the file: style,
-// pictures, drawings; it runs no script and loads nothing.
+// pictures, drawings; it loads nothing, and runs no script but those of a PageBlock.
 //
 //   ReportContents report;
 //   report.title = "Milk on bin";
@@ -108,8 +108,15 @@ struct HeatMapBlock {
   belief::HeatMap map;
   std::vector<Outline> outlines;
 };
+/// A document that runs by itself, in a frame of its own; an empty one is left out. The report's policy allows the
+/// scripts with these hashes (SHA-256 in base64) and no other.
+struct PageBlock {
+  std::string caption;
+  std::string html;
+  std::vector<std::string> script_hashes;
+};
 using ReportBlock = std::variant<TextBlock, PictureBlock, OutcomeBlock, TableBlock, ChartBlock, TornadoBlock,
-                                 TimelineBlock, StateBandBlock, HeatMapBlock, LinkBlock>;
+                                 TimelineBlock, StateBandBlock, HeatMapBlock, LinkBlock, PageBlock>;
 
 struct ReportSection {
   std::string title;
@@ -129,7 +136,8 @@ std::string report_html(const ReportContents& contents);
 /// Writes it; fails with kUnavailable when the file can't be written, and keeps what was there.
 core::Status write_report(const std::filesystem::path& path, const ReportContents& contents);
 /// Adds a section at the end of a page that write_report() wrote. Errors of read_file(); kInvalidInput for another
-/// file; kUnavailable when it can't be written, and keeps what was there.
+/// file; kUnavailable when it can't be written, and keeps what was there. The page's policy stays what it was: scripts
+/// of a PageBlock that is added do not run.
 core::Status add_section(const std::filesystem::path& path, const ReportSection& section);
 
 /// Sections that show an answer: outcomes, heat maps (with the outlines of the scene's supports), final poses,

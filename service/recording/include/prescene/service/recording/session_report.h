@@ -48,6 +48,9 @@ class SessionReport {
   /// The file of `prescene train` that objects were looked for with; "" = none.
   void set_proposals(std::string file) { proposals_ = std::move(file); }
 
+  /// The page of the live view with the session in it, which stands first.
+  void set_page(interfaces::PageBlock page) { page_ = std::move(page); }
+
   /// What was foreseen beside what came.
   void set_foreseen(const ForeseenAndCame& foreseen) {
     comparisons_ = foreseen.comparisons();
@@ -88,6 +91,7 @@ class SessionReport {
   std::vector<Comparison> comparisons_;
   bool came_is_truth_ = false;
   std::string proposals_;
+  interfaces::PageBlock page_;
 };
 
 }  // namespace prescene::service
