@@ -19,7 +19,7 @@ export function changeText(name, before, run) {
 // Across, steps are evenly spread, as they are along the slider beneath.
 export class Bands {
   constructor({ root, details, list, onSeek, onSelect }) {
-    Object.assign(this, { root, details, list, onSeek, onSelect, objects: [], runs: [], events: [], steps: 0, first: 0, shortest: 0, joined: 0 });
+    Object.assign(this, { root, details, list, onSeek, onSelect, objects: [], runs: [], events: [], newest: new Map(), steps: 0, first: 0, shortest: 0, joined: 0 });
     this.canvas = make('canvas');
     root.replaceChildren(this.canvas);
     const { canvas } = this;
@@ -45,6 +45,7 @@ export class Bands {
   add(runs = []) {
     for (const [object, index, time, state, heldBy] of runs) {
       const run = { object, index, time, state, heldBy }, before = this.newest.get(object);
+      if (before && index <= before.index) continue;  // the history that came just before has it already
       this.runs.push(run);
       this.newest.set(object, run);
       if (before) this.events.push({ object, index, time, text: changeText(this.objects[object], before, run) });
@@ -56,8 +57,8 @@ export class Bands {
     const shown = this.events.slice(-mostListed), left = this.events.length - shown.length;
     this.details.hidden = !this.events.length;
     this.details.firstElementChild.textContent = this.events.length === 1 ? '1 change of a state' : this.events.length + ' changes of states';
-    for (const note of this.details.querySelectorAll('p')) note.remove();
-    const note = (text) => this.details.insertBefore(make('p', { textContent: text }), this.list);
+    for (const note of this.details.querySelectorAll('.note')) note.remove();
+    const note = (text) => this.details.insertBefore(make('p', { className: 'note', textContent: text }), this.list);
     if (left) note('The last ' + shown.length + ' of them');
     if (this.joined) note(this.joined + ' states that lasted less than ' + this.shortest.toFixed(1) + ' s are left out');
     this.list.replaceChildren(...shown.map((event) => {

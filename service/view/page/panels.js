@@ -31,10 +31,11 @@ export function copyButton(label, title, text) {
 }
 // A name that a table's program would take for a formula gets an apostrophe.
 const csvName = (name) => '"' + (/^[=+\-@\t\r]/.test(name) ? "'" : '') + name.replaceAll('"', '""') + '"';
-// Lines as {name, points: [[t, value, deviation?]...]}, all with the same times.
+// Lines as {name, points: [[t, value, deviation?]...]}, all with the same times; one without points has empty cells.
 export function csvOf(lines) {
   const columns = lines.flatMap(({ name, points }) => points.length && points[0].length > 2 ? [name, name + ' deviation'] : [name]);
-  const rows = lines.length ? lines[0].points.map(([t], i) => [t, ...lines.flatMap(({ points }) => points[i].slice(1))]) : [];
+  const longest = lines.reduce((most, { points }) => points.length > most.length ? points : most, []);
+  const rows = longest.map(([t], i) => [t, ...lines.flatMap(({ points }) => (points[i] ?? [t, '']).slice(1))]);
   return [['time', ...columns].map(csvName), ...rows].map((row) => row.join(',')).join('\n') + '\n';
 }
 

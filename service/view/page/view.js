@@ -272,7 +272,11 @@ function setPlaying(playing) {
   requestAnimationFrame(tick);
 }
 const toChange = (direction) => {
-  const event = page.step && page.mode !== 'live' && bands.neighbour(page.wanted ?? page.step.index, direction);
+  if (!page.step || page.mode === 'live') return;
+  const from = page.wanted ?? page.step.index;
+  let event = bands.neighbour(from, direction);
+  // In a file, the step of a change may be left out: the one that stands for it is not beyond where we are.
+  while (recorded && event && direction > 0 && recorded.at(event.index) <= from) event = bands.neighbour(event.index, direction);
   if (event) { select(bands.objects[event.object]); seek(event.index); }
 };
 const move = (steps) => { if (page.step && page.mode !== 'live') seek(recorded ? recorded.at(page.step.index, steps) : page.step.index + steps); };
@@ -283,7 +287,7 @@ function addAnswer(text, when) {
   const number = nextNumber++;
   const element = make('div', { className: 'answer' }, make('h3', {}, make('span', { textContent: text }), make('small', { textContent: when })), make('p', { textContent: 'is being worked out ...' }));
   $('answers').prepend(element);
-  while ($('answers').children.length > 20) $('answers').lastChild.remove();
+  while (!recorded && $('answers').children.length > 20) $('answers').lastChild.remove();  // a file has no more than it has
   asked.set(number, { element, answer: null });
   element.addEventListener('click', () => showInScene(number));
   return number;

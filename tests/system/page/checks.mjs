@@ -36,6 +36,7 @@ export async function checkChanges(page, history, stepAt) {
     changes.push({ index, text: `${time.toFixed(2)} s, ${history.objects[object]}: ${said.join('; ')}` });
   }
   assert.deepEqual(await page.texts('#events button'), changes.map((c) => c.text));
+  assert.match((await page.texts('#happened p')).join(' '), /tracked.*doubtful.*unseen.*lost.*held/, 'what the colours mean');
   for (const { index } of changes.slice(0, 5)) {
     await page.browser.value(`[...${page.at}.querySelectorAll('#events button')][${changes.findIndex((c) => c.index === index)}].click()`);
     await checkObjects(page, await stepAt(index));
