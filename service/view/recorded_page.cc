@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <span>
+#include <utility>
 
 #include "json_fields.h"
 #include "page_files.h"

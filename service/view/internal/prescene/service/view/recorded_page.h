@@ -2,21 +2,19 @@
 // The page of the live view with a recording in it, as one document that needs no program: for reports.
 //
 //   RecordedPage page({.title = "milk.mcap"});
-//   PRESCENE_RETURN_IF_ERROR(page.add(step));      // each of a replay
-//   report.set_page(page.take());
+//   page.add(step);                                // each of a replay
+//   report.set_page(page.page());
 //
 // Bounded, however long the recording is: of its steps and pictures every second one is kept, then every fourth, and
 // so on. Steps at which a state changes stay longest.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
-#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "prescene/interfaces/reports/report.h"
