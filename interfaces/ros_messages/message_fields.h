@@ -224,6 +224,6 @@ struct MinWireSize<std::array<T, n>> {
   DO(RosSetParametersAtomicallyResponse) DO(RosSetParametersRequest) DO(RosSetParametersResponse) \
   DO(RosPoint32) DO(RosPolygon) DO(RosSolidPrimitive) DO(RosMeshTriangle) DO(RosMesh) DO(RosPlane) DO(RosObjectType) \
   DO(RosCollisionObject) \
-  DO(RosAlternativePose) DO(RosParameterEstimate) DO(RosObjectBelief) DO(RosJointBelief) DO(RosBelief) DO(RosEvent) DO(RosQuery) \
-  DO(RosCancel) DO(RosEstimate) DO(RosAnswer) DO(RosProgress)
+  DO(RosAlternativePose) DO(RosParameterEstimate) DO(RosObjectBelief) DO(RosJointBelief) DO(RosBelief) DO(RosEvent) \
+  DO(RosQuery) DO(RosCancel) DO(RosEstimate) DO(RosAnswer) DO(RosProgress)
 // clang-format on
