@@ -23,8 +23,8 @@ using interfaces::RosObjectMotion;
 using interfaces::RosObjectState;
 using nlohmann::ordered_json;
 
-constexpr const char* kKinds[] = {"where",     "predict",  "stability", "view",   "achieve",
-                                  "relations", "timeline", "next_view", "explain"};
+constexpr const char* kKinds[] = {"where",     "predict",  "stability", "view",    "achieve",
+                                  "relations", "timeline", "next_view", "explain", "why"};
 
 template <class Enum>
 constexpr std::uint8_t ros_number(Enum value) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -188,6 +189,23 @@ TEST(TypedMessages, AnswersHaveTheirEstimates) {
   EXPECT_EQ(refused.code, "not_found");
 
   EXPECT_EQ(answer_message(R"({"id": "c", "cancelled": "1"})").state, number(RosAnswerState::kCancelled));
+}
+
+// Query.msg lists the kinds of questions in the line above `kind`.
+TEST(TypedMessages, AnAnswerNamesEachKindOfQuestionThatThereIs) {
+  std::ifstream file(tests::source_dir() / "packaging/prescene_msgs/msg/Query.msg");
+  std::string kinds;
+  for (std::string line; std::getline(file, line) && line != "string kind";) kinds = line;
+  std::size_t count = 0;
+  for (std::size_t from = kinds.find('"'); from != std::string::npos; from = kinds.find('"', from + 1), ++count) {
+    const std::size_t to = kinds.find('"', from + 1);
+    const std::string kind = kinds.substr(from + 1, to - from - 1);
+    const RosAnswer answer = answer_message(ordered_json{{"step", 1}, {kind, ordered_json::object()}}.dump());
+    EXPECT_EQ(answer.kind, kind);
+    EXPECT_EQ(answer.state, number(RosAnswerState::kAnswered)) << kind;
+    from = to;
+  }
+  EXPECT_EQ(count, 10U);
 }
 
 TEST(TypedMessages, AnAnswerToWhereHasTheObjectsOfTheBelief) {
