@@ -133,7 +133,9 @@ MotionCheck MotionChecker::first_contacts(std::span<const double> q0, std::span<
     ++result.steps;
     const auto contact =
         collision::first_contact(*obstacle.shape.triangles(), *body.triangles(), *motion, {}, scratch.shapes.triangles);
-    if (contact.outcome == collision::MotionOutcome::kNoContact || contact.time >= result.free_until) continue;
+    if (contact.outcome == collision::MotionOutcome::kNoContact) continue;
+    // One just at the end is a contact, too.
+    if (result.outcome != MotionCheck::kFree && contact.time >= result.free_until) continue;
     result.free_until = contact.time;
     result.outcome =
         contact.outcome == collision::MotionOutcome::kContact ? MotionCheck::kBlocked : MotionCheck::kStepLimit;
