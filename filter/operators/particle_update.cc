@@ -24,7 +24,8 @@ constexpr double kSharedTurn = 0.03;         // rad
 constexpr double kContactHeight = 0.001;     // m, error of a support's height where no frame can tell
 constexpr double kUncertainTurn = 0.03;      // rad; turns that are known better are not questioned, ...
 constexpr double kLeastTold = 0.01;          // of a variance; ... nor those of which the frame says less
-constexpr double kSideways = 2.0;            // standard deviations to either side of a turn in question
+constexpr double kSideways = 3.0;            // standard deviations to either side of a turn in question
+constexpr double kConfirms = 0.5;            // share of the fall that is told; noise and other terms take the rest
 constexpr double kLogInSupport = -12.0;      // nats; kMostInSupport and more costs this; less in proportion
 
 /// What the outline is worth: 0 where nothing ends at it, 1 where enough does.
@@ -194,7 +195,7 @@ bool ParticleUpdate::keep_confirmed(const Pose& X_WO, const Matrix6d& covariance
     double fall = std::numeric_limits<double>::infinity();
     for (const double side : {-reach, reach})
       fall = std::min(fall, *log_here - evidence(geometry::box_plus(X_WO, side * sideways)).log_ratio);
-    const double confirmed = information_share_ * fall / (0.5 * reach * reach * told);
+    const double confirmed = information_share_ * fall / (kConfirms * 0.5 * reach * reach * told);
     if (!(confirmed < 1.0)) continue;
     const double share = (1.0 - std::max(0.0, confirmed)) / told;
     equations.gradient -= share * sideways.dot(equations.gradient) * slope;

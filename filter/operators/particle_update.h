@@ -85,9 +85,9 @@ class ParticleUpdate {
   /// Depth residuals up to the gate, tempered, and the outline if there is one.
   FrameEquations equations_at(const Pose& X_WO, double gate, const Outline* outline, bool with_evidence = false) const;
   /// Takes out of `equations` what the likelihood does not confirm of turns that stay uncertain: where it falls by less
-  /// than the equations have it, to either side, they know the turn no better than it does (a handle that is hidden,
-  /// facets, noise along an outline). `covariance`: of the pose, given the prediction and the equations. Returns
-  /// whether anything was taken.
+  /// than half of what the equations have it, to either side, they know the turn no better than it does (a handle that
+  /// is hidden, facets, noise along an outline). `covariance`: of the pose, given the prediction and the equations.
+  /// Returns whether anything was taken.
   bool keep_confirmed(const Pose& X_WO, const Matrix6d& covariance, FrameEquations& equations) const;
   /// What follows from resting at this pose, where the frame says that of it (standing.h); zero where nothing does.
   PoseEquations standing_at(const Pose& X_WO, const FrameEquations& seen) const;
