@@ -11,6 +11,7 @@
 #include "prescene/belief/scene_size.h"
 #include "prescene/belief/trajectory.h"
 #include "prescene/core/random.h"
+#include "prescene/core/text.h"
 #include "prescene/simulation/rules/action_draws.h"
 
 namespace prescene::service {
@@ -23,6 +24,7 @@ using belief::Scene;
 using belief::WorldState;
 
 constexpr double kTimelineStep = 1.0 / 240.0;  // s; what a hand did by its actions is written down so finely
+constexpr double kTimeRounding = 1e-9;         // s; times that differ by less are the same
 
 /// How long an action lasts that a change would break off; a push goes on over a change.
 double unbroken_duration(const Action& action) {
@@ -37,9 +39,9 @@ core::Status check(const Scene& scene, const UnannouncedChange& change) {
     return core::invalid_input(at + ": its time is outside the scene's duration: give 0 to " +
                                std::to_string(scene.duration) + " s");
   for (const Action& action : scene.actions) {
-    if (action.time < change.time && change.time < action.time + unbroken_duration(action))
-      return core::invalid_input(at + ": it lies within a " + belief::kind_of(action) +
-                                 ", which it would break off: give a time before or after");
+    if (action.time < change.time && change.time < action.time + unbroken_duration(action) - kTimeRounding)
+      return core::invalid_input(at + ": its frame, at " + core::fixed_text(change.time, 3) + " s, lies within a " +
+                                 belief::kind_of(action) + ", which it would break off: give a time before or after");
   }
   return core::ok_status();
 }
@@ -159,6 +161,14 @@ std::vector<std::string> split(const std::string& text, char separator) {
 
 }  // namespace
 
+double frame_of_change(const Scene& scene, double time, double interval) {
+  const double frame = std::min(std::round(time / interval) * interval, scene.duration);
+  // An action at this frame comes neither before it nor after it by rounding, which would lose the action.
+  for (const Action& action : scene.actions)
+    if (std::abs(action.time - frame) <= kTimeRounding) return action.time;
+  return frame;
+}
+
 core::Result<UnannouncedChange> removal_from_text(const std::string& text) {
   const std::vector<std::string> parts = split(text, ':');
   const std::optional<double> time = number(parts[0]);
@@ -192,7 +202,8 @@ core::Result<std::vector<PlayedPart>> play_scene(const Scene& scene, std::vector
                                                  std::uint64_t seed, core::ThreadPool& pool) {
   for (UnannouncedChange& change : changes) {
     PRESCENE_RETURN_IF_ERROR(check(scene, change));
-    change.time = std::round(change.time / interval) * interval;
+    change.time = frame_of_change(scene, change.time, interval);
+    PRESCENE_RETURN_IF_ERROR(check(scene, change));  // an action may have begun until then
   }
   std::stable_sort(changes.begin(), changes.end(), [](const auto& a, const auto& b) { return a.time < b.time; });
 

@@ -226,7 +226,7 @@ core::Result<HappenedRecord> look_closely(const belief::Scene& scene, const Simu
   const double most = std::max(1.0, kMostFineStates * interval / scene.duration);
   const double finer = std::clamp(std::round(interval / kFinest), 1.0, std::floor(most));
   std::vector<UnannouncedChange> changes = options.changes;
-  for (UnannouncedChange& change : changes) change.time = std::round(change.time / interval) * interval;
+  for (UnannouncedChange& change : changes) change.time = frame_of_change(scene, change.time, interval);
   PRESCENE_TRY(const std::vector<PlayedPart> parts,
                play_scene(scene, changes, backends.simulator_factory(), interval / finer, seed, backends.pool()));
   PRESCENE_TRY(const auto simulator, backends.make_simulator(scene));

@@ -108,6 +108,45 @@ TEST_F(PlayedSceneTest, WhatIsNotThereFromTheStartMayBePutIn) {
   EXPECT_EQ(parts->back().scene.objects.size(), 2u);
 }
 
+// The nearest frame is then behind the scene's end.
+TEST_F(PlayedSceneTest, AChangeAtTheEndIsAtTheEnd) {
+  belief::Scene longer = *scene_;
+  longer.duration = 1.07;
+  const auto parts =
+      play_scene(longer, {{1.07, "left", std::nullopt}}, backends_.simulator_factory(), kFrameInterval, 1, pool_);
+  ASSERT_TRUE(parts.ok()) << parts.status().message();
+  ASSERT_EQ(parts->size(), 2u);
+  EXPECT_EQ(parts->back().scene.objects.size(), 1u);
+  ASSERT_EQ(parts->back().trajectory.states.size(), 1u);
+  EXPECT_DOUBLE_EQ(parts->back().trajectory.states[0].time, 1.07);
+}
+
+// 0.3 is not 3 * 0.1 in binary: the release would count as one from before.
+TEST_F(PlayedSceneTest, AnActionAtTheFrameOfAChangeIsNotLost) {
+  belief::Scene scene = *scene_;
+  ASSERT_LT(0.3, 3 * kFrameInterval);
+  scene.actions = {{0.3, belief::Release{"held"}}};
+  const auto parts =
+      play_scene(scene, {{0.3, "left", std::nullopt}}, backends_.simulator_factory(), kFrameInterval, 1, pool_);
+  ASSERT_TRUE(parts.ok()) << parts.status().message();
+  EXPECT_LT(parts->back().trajectory.final().objects[0].X_WO.translation.z(), 0.05);
+}
+
+TEST_F(PlayedSceneTest, RefusesAChangeWhoseFrameIsWithinAnAction) {
+  belief::Scene scene = *scene_;
+  scene.actions = {{0.34, belief::Transport{"held", belief::FixedPose{{}}, 0.3}}};
+  for (const double time : {0.35, 0.4, 0.63}) {
+    const auto parts =
+        play_scene(scene, {{time, "left", std::nullopt}}, backends_.simulator_factory(), kFrameInterval, 1, pool_);
+    EXPECT_EQ(parts.status().code(), core::StatusCode::kInvalidInput) << time;
+  }
+  scene.actions[0].time = 0.36;  // 0.36 is before it, but its frame, 0.4, is not
+  EXPECT_EQ(play_scene(scene, {{0.36, "left", std::nullopt}}, backends_.simulator_factory(), kFrameInterval, 1, pool_)
+                .status()
+                .code(),
+            core::StatusCode::kInvalidInput);
+}
+
 TEST_F(PlayedSceneTest, RefusesWhatCannotBe) {
   const auto fails_with = [&](std::vector<UnannouncedChange> changes, const std::string& part) {
     const auto parts = play(std::move(changes));

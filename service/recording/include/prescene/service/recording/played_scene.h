@@ -39,9 +39,13 @@ struct PlayedPart {
   belief::Trajectory trajectory;  ///< A state each frame, up to the frame before the next change.
 };
 
+/// When a change that is to be at `time` (s) takes place in a scene that is sampled every `interval` s: at the nearest
+/// frame, or the scene's end.
+double frame_of_change(const belief::Scene& scene, double time, double interval);
+
 /// One instance of `scene`, drawn with `seed`, sampled every `interval` s. It goes on after everything has come to
-/// rest. kInvalidInput where a change names no object of the scene, lies outside its duration, or within an action
-/// other than a push; errors of the factory.
+/// rest. kInvalidInput where a change names no object of the scene, lies outside its duration, or, it or its frame,
+/// within an action other than a push; errors of the factory.
 core::Result<std::vector<PlayedPart>> play_scene(const belief::Scene& scene, std::vector<UnannouncedChange> changes,
                                                  const simulation::SimulatorFactory& simulators, double interval,
                                                  std::uint64_t seed, core::ThreadPool& pool);

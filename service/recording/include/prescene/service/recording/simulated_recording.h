@@ -58,9 +58,10 @@ std::string camera_frame_of(const belief::Scene& scene, int camera = 0);
 /// One instance of the scene, drawn from its distributions with `seed`, from its start to its duration (it goes on
 /// after everything has come to rest, so that the camera sees the end). Messages: latched camera pose, robot poses,
 /// camera info, depth (16UC1, millimetres) and colour (rgb8), the scene's actions as controls at their times, the truth
-/// of each frame, and in the end what happened (happened.h) and which of the scene's outcomes occurred. Several cameras take turns: they are not
-/// triggered together. Fails with kInvalidInput when the scene has no camera, or one of several has no pose, a change
-/// is none (play_scene), or frames are asked for (on_frame) through a lens; kCancelled with what is done kept.
+/// of each frame, and in the end what happened (happened.h) and which of the scene's outcomes occurred. Several cameras
+/// take turns: they are not triggered together. Fails with kInvalidInput when the scene has no camera, or one of
+/// several has no pose, a change is none (play_scene), or frames are asked for (on_frame) through a lens; kCancelled
+/// with what is done kept.
 core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecordingOptions& options,
                                 std::uint64_t seed, Backends& backends, const core::Cancellation& cancellation,
                                 const core::ProgressSink& progress, RecordingWriter& recording);
