@@ -81,7 +81,9 @@ class MoveJointPlan final : public OwnActionPlan {
     joint_ = &scene_->joints[static_cast<std::size_t>(*belief::find_joint(*scene_, own.joint))];
     const bool slides = joint_->type == belief::JointType::kSlider;
     const double unit = slides ? 1.0 : geometry::kDegree;
-    if (chosen(slides ? "to_deg" : "to") && !chosen(slides ? "to" : "to_deg"))
+    // By the whole name: "to" is another parameter than "to_deg", not short for it.
+    const auto names = [other = slides ? "to_deg" : "to"](const auto& one) { return one.name == other; };
+    if (std::ranges::any_of(query_.free, names) || std::ranges::any_of(query_.fixed, names))
       return core::invalid_input(
           "the joint '" + own.joint + "' is " +
           (slides ? "a slider: its position is 'to', in metres" : "a hinge: its position is 'to_deg', in degrees"));

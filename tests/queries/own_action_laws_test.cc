@@ -333,6 +333,21 @@ TEST(OwnActions, WhatTheSceneLacksIsRefusedWithTheRemedy) {
     if (one.kind == "move_joint") {
       query.free = {{"to_deg", 0.0, 10.0}};
       EXPECT_THAT(ask(one, query).error.message(), HasSubstr("is a slider: its position is 'to', in metres"));
+      query.free = {{"to", 0.0, 0.1}};
+      query.fixed = {{"to_deg", 5.0}};
+      EXPECT_THAT(ask(one, query).error.message(), HasSubstr("is a slider: its position is 'to', in metres"));
+      auto hinged = scene_of(one);
+      hinged->joints[0].type = belief::JointType::kHinge;
+      std::get<belief::MoveJoint>(hinged->actions.back().what).type = belief::JointType::kHinge;
+      const auto ask_hinged = [&] {
+        core::ThreadPool pool(1);
+        return queries::answer(hinged, 1, {"q", query}, tests::context_with(law_of(one), pool)).error.message();
+      };
+      query.fixed.clear();
+      EXPECT_THAT(ask_hinged(), HasSubstr("is a hinge: its position is 'to_deg', in degrees"));
+      query.free = {{"force", 10.0, 20.0}};
+      query.fixed = {{"to", 0.1}};
+      EXPECT_THAT(ask_hinged(), HasSubstr("is a hinge: its position is 'to_deg', in degrees"));
       query = question(one);
       query.object = "carton";
       EXPECT_THAT(ask(one, query).error.message(), HasSubstr("'carton' hangs on no joint"));
