@@ -4,6 +4,7 @@
 #include "prescene/belief/explain_question.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
+#include "prescene/belief/validation.h"
 #include "prescene/belief/why_question.h"
 
 namespace prescene::belief {
@@ -15,6 +16,7 @@ void read_against(const JsonAt& at, WhyQuestion& question) {
   if (at.value.is_object()) {
     question.against = WhyAgainst::kPose;
     question.X_WO = pose_from(at);
+    if (const core::Status possible = check_pose(*question.X_WO); !possible.ok()) at.fail(possible.message());
     return;
   }
   const std::string word = at.value.is_string() ? at.text() : "";

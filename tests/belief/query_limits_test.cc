@@ -187,6 +187,8 @@ TEST(WhyQuestion, NamesWhatIsWrongInIt) {
   EXPECT_THAT(refusal(R"({"object": "a", "against": "nothing"})"), HasSubstr("give \"absence\""));
   EXPECT_THAT(refusal(R"({"object": "a", "against": 3})"), HasSubstr("why.against"));
   EXPECT_THAT(refusal(R"({"object": "a", "against": {}})"), HasSubstr("position, rotation"));
+  EXPECT_THAT(refusal(R"({"object": "a", "against": {"position": [0, 1e300, 0]}})"),
+              HasSubstr("why.against: position"));
   EXPECT_THAT(refusal(R"({"object": "a", "images": 17})"), HasSubstr("why.images"));
   EXPECT_THAT(refusal(R"({"object": "a", "from": 1})"), HasSubstr("'from' and 'to' go together"));
   EXPECT_THAT(refusal(R"({"object": "a", "from": 1, "to": 2, "last": 1})"), HasSubstr("two windows"));
