@@ -22,14 +22,14 @@ struct JudgedComparison {
 struct JudgedFrame {
   WhyView view;
   std::vector<JudgedComparison> comparisons;  ///< In the order of the poses that were given.
-  rendering::Tempering tempering;
-  int step = 1;         ///< Full-image pixels between two of the likelihood's.
-  double pixels = 0.0;  ///< With depth, at the pose that has most of them.
+  rendering::Tempering tempering;             ///< Of the frame's likelihood.
+  int step = 1;                               ///< Full-image pixels between two of the likelihood's.
+  double pixels = 0.0;                        ///< With depth, at the pose that has most of them.
 };
 
 class FrameJudge {
  public:
-  /// All must outlive it. `images`: that are kept of each comparison, in all.
+  /// Both must outlive it.
   FrameJudge(const WhyContext& context, const filter::FilterTools& tools) : context_(context), tools_(tools) {}
 
   /// `object`: of the frame's belief. `others`: where it would be instead; empty = nowhere. kResourceExhausted where so

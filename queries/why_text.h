@@ -8,7 +8,8 @@
 
 namespace prescene::queries {
 
-/// `X_WO`: the pose that is believed; `symmetry`: of the object's model.
+/// A paragraph about a comparison of the answer, which has its views and tempering. `symmetry`: of the object's model;
+/// `begin_ns`: the stamp that its seconds count from.
 std::string text_of(const WhyComparison& comparison, const WhyAnswer& answer, const geometry::SymmetryGroup& symmetry,
                     core::TimeNs begin_ns);
 /// How much of the object the frames show, and what hides the rest.
