@@ -7,6 +7,7 @@
 #include "prescene/service/backends.h"
 #include "prescene/service/live/live_service.h"
 #include "prescene/service/recording/replay_input.h"
+#include "prescene/service/recording/session_report.h"
 #include "prescene/service/view/live_view.h"
 #include "prescene/service/view/recording_view.h"
 
@@ -24,6 +25,11 @@ extern const double seconds;
 extern const std::vector<std::string> degraded;
 extern const std::string answer_json;
 }  // namespace live_view_h
+
+namespace recorded_page_h {
+extern const ShownStep step;
+extern SessionReport report;
+}  // namespace recorded_page_h
 
 namespace recording_view_h {
 extern const ReplayInput input;
