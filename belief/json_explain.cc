@@ -64,7 +64,8 @@ void read_fields(const JsonAt& at, ExplainQuestion& question) {
 
 bool asks_to_explain(std::string_view json) {
   // Looked for first, as most questions are others and need not be parsed twice.
-  if (json.find("\"explain\"") == std::string_view::npos) return false;
+  // A backslash may write the key in another way.
+  if (json.find("\"explain\"") == std::string_view::npos && json.find('\\') == std::string_view::npos) return false;
   const auto document = parse_json(json, kLongestExplainQuestion);
   return document && document->is_object() && document->contains("explain");
 }

@@ -71,7 +71,8 @@ const char* name_of(WhyAgainst against) {
 
 bool asks_why(std::string_view json) {
   // Looked for first, as most questions are others and need not be parsed twice.
-  if (json.find("\"why\"") == std::string_view::npos) return false;
+  // A backslash may write the key in another way.
+  if (json.find("\"why\"") == std::string_view::npos && json.find('\\') == std::string_view::npos) return false;
   const auto document = parse_json(json, kLongestWhyQuestion);
   return document && document->is_object() && document->contains("why");
 }
