@@ -71,8 +71,8 @@ core::Result<std::shared_ptr<const MotionChecker>> MotionChecker::make(std::shar
 }
 
 void MotionChecker::place(std::span<const double> q, PlanningScratch& scratch) const {
-  scratch.poses.resize(mover_->shapes().size());
-  mover_->place(q, scratch.poses, &scratch.work);
+  scratch.poses_.resize(mover_->shapes().size());
+  mover_->place(q, scratch.poses_, &scratch.work_);
 }
 
 const PlanningShape& MotionChecker::other_shape(const Pair& pair) const {
@@ -80,8 +80,8 @@ const PlanningShape& MotionChecker::other_shape(const Pair& pair) const {
 }
 
 Pose MotionChecker::other_to_shape(const Pair& pair, const PlanningScratch& scratch) const {
-  const Pose& X_WO = pair.is_own ? scratch.poses[pair.other] : obstacles_[pair.other].X_WO;
-  return X_WO.inverse() * scratch.poses[pair.shape];
+  const Pose& X_WO = pair.is_own ? scratch.poses_[pair.other] : obstacles_[pair.other].X_WO;
+  return X_WO.inverse() * scratch.poses_[pair.shape];
 }
 
 double MotionChecker::gap(const Pair& pair, double below, PlanningScratch& scratch) const {
@@ -148,36 +148,36 @@ MotionCheck MotionChecker::bisect(std::span<const double> q0, std::span<const do
                                   Order order) const {
   MotionCheck result;
   const double margin = options_.margin;
-  scratch.ways.resize(pairs_.size());
-  scratch.bounds.clear();
-  scratch.pieces.clear();
+  scratch.ways_.resize(pairs_.size());
+  scratch.bounds_.clear();
+  scratch.pieces_.clear();
   place(q0, scratch);
   ++result.steps;
   for (std::uint32_t i = 0; i < pairs_.size(); ++i) {
     const Pair& pair = pairs_[i];
     const auto other = pair.is_own ? std::optional<std::size_t>(pair.other) : std::nullopt;
-    double& way = scratch.ways[i];
+    double& way = scratch.ways_[i];
     way = mover_->way(pair.shape, other, q0, q1);
     if (pair.is_own) way += mover_->way(pair.other, pair.shape, q0, q1);
     const double gap_there = gap(pair, margin + way, scratch);
     if (gap_there <= margin) return {MotionCheck::kBlocked, 0.0, result.steps};
-    if (gap_there < kInfinity) scratch.bounds.push_back({i, gap_there, kInfinity});
+    if (gap_there < kInfinity) scratch.bounds_.push_back({i, gap_there, kInfinity});
   }
   place(q1, scratch);
   ++result.steps;
   std::size_t kept = 0;
   bool end_is_free = true;
-  for (PlanningScratch::Bound bound : scratch.bounds) {
-    const double way = scratch.ways[bound.pair];
+  for (PlanningScratch::Bound bound : scratch.bounds_) {
+    const double way = scratch.ways_[bound.pair];
     bound.at_end = gap(pairs_[bound.pair], margin + way, scratch);
     end_is_free = end_is_free && bound.at_end > margin;
     if (way < bound.at_begin + bound.at_end - 2.0 * margin) continue;
-    scratch.bounds[kept++] = bound;
+    scratch.bounds_[kept++] = bound;
   }
-  scratch.bounds.resize(kept);
+  scratch.bounds_.resize(kept);
   if (!end_is_free && order == Order::kAny) return {MotionCheck::kBlocked, 0.0, result.steps};
   if (kept == 0) return result;
-  scratch.pieces.push_back({0.0, 1.0, 0, kept});
+  scratch.pieces_.push_back({0.0, 1.0, 0, kept});
   return cut_pieces(q0, q1, scratch, order, result);
 }
 
@@ -185,8 +185,8 @@ MotionCheck MotionChecker::bisect(std::span<const double> q0, std::span<const do
 double MotionChecker::known_free(const PlanningScratch& scratch, const PlanningScratch::Piece& piece) const {
   double until = piece.end;
   for (std::size_t i = piece.first; i < piece.first + piece.count; ++i) {
-    const PlanningScratch::Bound& bound = scratch.bounds[i];
-    const double way = scratch.ways[bound.pair];
+    const PlanningScratch::Bound& bound = scratch.bounds_[i];
+    const double way = scratch.ways_[bound.pair];
     if (way > 0.0) until = std::min(until, piece.begin + (bound.at_begin - options_.margin) / way);
   }
   return std::max(until, 0.0);
@@ -195,10 +195,10 @@ double MotionChecker::known_free(const PlanningScratch& scratch, const PlanningS
 MotionCheck MotionChecker::cut_pieces(std::span<const double> q0, std::span<const double> q1, PlanningScratch& scratch,
                                       Order order, MotionCheck result) const {
   const double margin = options_.margin;
-  auto& pieces = scratch.pieces;
-  auto& bounds = scratch.bounds;
-  auto& right = scratch.right;
-  scratch.configuration.resize(mover_->dimension());
+  auto& pieces = scratch.pieces_;
+  auto& bounds = scratch.bounds_;
+  auto& right = scratch.right_;
+  scratch.configuration_.resize(mover_->dimension());
   for (std::size_t next = 0; next < pieces.size();) {
     // From the start on: the last that was put down. Else the longest: the first.
     const PlanningScratch::Piece piece = order == Order::kEarliest ? pieces.back() : pieces[next];
@@ -212,15 +212,15 @@ MotionCheck MotionChecker::cut_pieces(std::span<const double> q0, std::span<cons
     };
     if (result.steps >= options_.step_limit) return ended(MotionCheck::kStepLimit);
     const double middle = 0.5 * (piece.begin + piece.end);
-    mover_->between(q0, q1, middle, scratch.configuration);
-    place(scratch.configuration, scratch);
+    mover_->between(q0, q1, middle, scratch.configuration_);
+    place(scratch.configuration_, scratch);
     ++result.steps;
     right.clear();
     const std::size_t first = bounds.size();
     bool is_blocked = false, is_short = false;
     for (std::size_t i = piece.first; i < piece.first + piece.count; ++i) {
       const PlanningScratch::Bound bound = bounds[i];
-      const double way = scratch.ways[bound.pair] * (middle - piece.begin);
+      const double way = scratch.ways_[bound.pair] * (middle - piece.begin);
       const double there = gap(pairs_[bound.pair], margin + way, scratch);
       if (there == kInfinity) continue;
       const bool left_open = !(way < bound.at_begin + there - 2.0 * margin);

@@ -68,10 +68,10 @@ class PlanningScratch {
     double begin, end;
     std::size_t first, count;  // Of the bounds.
   };
-  std::vector<geometry::Pose> poses, work;
-  std::vector<double> configuration, ways;
-  std::vector<Bound> bounds, right;
-  std::vector<Piece> pieces;
+  std::vector<geometry::Pose> poses_, work_;
+  std::vector<double> configuration_, ways_;
+  std::vector<Bound> bounds_, right_;
+  std::vector<Piece> pieces_;
 };
 
 class MotionChecker {
