@@ -24,8 +24,10 @@ constexpr double kSharedTurn = 0.03;         // rad
 constexpr double kContactHeight = 0.001;     // m, error of a support's height where no frame can tell
 constexpr double kUncertainTurn = 0.03;      // rad; turns that are known better are not questioned, ...
 constexpr double kLeastTold = 0.01;          // of a variance; ... nor those of which the frame says less
-constexpr double kSideways = 3.0;            // standard deviations to either side of a turn in question
+constexpr double kSideways = 3.0;            // standard deviations to either side of a turn in question, ...
+constexpr double kLeastSideways = 0.010;     // m; ... and so far that its surface moves by this, more than noise
 constexpr double kConfirms = 0.5;            // share of the fall that is told; noise and other terms take the rest
+constexpr double kLogConfirms = 3.0;         // nats; a fall by as much, some three times its noise, is enough
 constexpr double kLogInSupport = -12.0;      // nats; kMostInSupport and more costs this; less in proportion
 
 /// What the outline is worth: 0 where nothing ends at it, 1 where enough does.
@@ -180,6 +182,7 @@ FrameEquations ParticleUpdate::equations_at(const Pose& X_WO, double gate, const
 
 bool ParticleUpdate::keep_confirmed(const Pose& X_WO, const Matrix6d& covariance, FrameEquations& equations) const {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(covariance.topLeftCorner<3, 3>());
+  const double radius = std::max(1e-3, static_cast<double>(target_.mesh->radius));
   std::optional<double> log_here;
   bool taken = false;
   for (int i = 0; i < 3; ++i) {
@@ -191,11 +194,13 @@ bool ParticleUpdate::keep_confirmed(const Pose& X_WO, const Matrix6d& covariance
     const double told = sideways.dot(slope);
     if (!(told > kLeastTold)) continue;
     if (!log_here) log_here = evidence(X_WO).log_ratio;
-    const double reach = std::min(kSideways, kMostStartTurn / deviation);
+    const double least = std::min(kLeastSideways / radius, kMostStartTurn);
+    const double reach = std::clamp(kSideways * deviation, least, kMostStartTurn) / deviation;
     double fall = std::numeric_limits<double>::infinity();
     for (const double side : {-reach, reach})
       fall = std::min(fall, *log_here - evidence(geometry::box_plus(X_WO, side * sideways)).log_ratio);
-    const double confirmed = information_share_ * fall / (kConfirms * 0.5 * reach * reach * told);
+    const double asked = std::min(kConfirms * 0.5 * reach * reach * told, kLogConfirms);
+    const double confirmed = information_share_ * fall / asked;
     if (!(confirmed < 1.0)) continue;
     const double share = (1.0 - std::max(0.0, confirmed)) / told;
     equations.gradient -= share * sideways.dot(equations.gradient) * slope;

@@ -85,10 +85,10 @@ class ParticleUpdate {
   /// Depth residuals up to the gate, tempered, and the outline if there is one.
   FrameEquations equations_at(const Pose& X_WO, double gate, const Outline* outline, bool with_evidence = false) const;
   /// Takes out of `equations` what the likelihood does not confirm of turns that stay uncertain: where it falls by less
-  /// than half of what the equations have it, to either side, they know the turn no better than it does (a handle that
-  /// is hidden, facets, noise along an outline). `covariance`: of the pose, which says what turns are uncertain and
-  /// what follows them; of a climb given the prediction and the equations, of what lies still before the frame.
-  /// Returns whether anything was taken.
+  /// than half of what the equations have it, and by little, to either side, they know the turn no better than it does
+  /// (a handle that is hidden, facets, noise along an outline). `covariance`: of the pose, which says what turns are
+  /// uncertain and what follows them; of a climb given the prediction and the equations, of what lies still before the
+  /// frame. Returns whether anything was taken.
   bool keep_confirmed(const Pose& X_WO, const Matrix6d& covariance, FrameEquations& equations) const;
   /// What follows from resting at this pose, where the frame says that of it (standing.h); zero where nothing does.
   PoseEquations standing_at(const Pose& X_WO, const FrameEquations& seen) const;
