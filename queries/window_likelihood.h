@@ -62,8 +62,8 @@ struct NearPath {
   PathError error;         ///< Has the covariance.
 };
 
-/// What the log ratio of one of `frames` (>= 1) frames counts: tempered by its pixels, as a frame by itself is, and by a
-/// further 1 / (1 + c (frames - 1)), since frames average out only errors that differ between them.
+/// What the log ratio of one of `frames` (>= 1) frames counts: tempered by its pixels, as a frame by itself is, and by
+/// a further 1 / (1 + c (frames - 1)), since frames average out only errors that differ between them.
 double window_tempering(const rendering::Tempering& tempering, double pixels, int step, std::size_t frames);
 
 class WindowLikelihood {
