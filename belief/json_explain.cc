@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // JSON of the question what happened, both ways.
-#include "json_values.h"
+#include "json_frames_question.h"
 #include "prescene/belief/explain_question.h"
-#include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
 
 namespace prescene::belief {
 namespace {
 
-constexpr std::size_t kLongestExplainQuestion = std::size_t{1} << 16;
 constexpr ScalarRange kHalfWidths{1e-3, 0.5, "give a half width between 0.001 and 0.5, like 0.05"};
 
 void read_count(JsonObject& fields, const std::string& key, int low, int high, int& to) {
@@ -23,16 +21,10 @@ void read_fields(const JsonAt& at, ExplainQuestion& question) {
       name->fail("the name has " + std::to_string(question.object.size()) + " bytes: give at most " +
                  std::to_string(kLongestName));
   }
-  question.from = read_number(fields, "from", kWindowEnds);
-  question.to = read_number(fields, "to", kWindowEnds);
-  const auto last = read_number(fields, "last", kWindowSeconds);
-  question.last = last.value_or(question.last);
-  if (question.from.has_value() != question.to.has_value())
-    at.fail("'from' and 'to' go together: give both, or 'last'");
-  else if (question.from && last)
-    at.fail("'last' and 'from' are two windows: give one of them");
-  else if (question.from && !(*question.from < *question.to))
-    at.fail("'from' is not before 'to': exchange them");
+  const WindowFields window = read_window(at, fields);
+  question.from = window.from;
+  question.to = window.to;
+  question.last = window.last.value_or(question.last);
   read_count(fields, "frames", 2, 64, question.frames);
   read_count(fields, "runs", 2, 64, question.runs);
   read_count(fields, "points", 8, 4096, question.points);
@@ -62,31 +54,10 @@ void read_fields(const JsonAt& at, ExplainQuestion& question) {
 
 }  // namespace
 
-bool asks_to_explain(std::string_view json) {
-  // Looked for first, as most questions are others and need not be parsed twice.
-  // A backslash may write the key in another way.
-  if (json.find("\"explain\"") == std::string_view::npos && json.find('\\') == std::string_view::npos) return false;
-  const auto document = parse_json(json, kLongestExplainQuestion);
-  return document && document->is_object() && document->contains("explain");
-}
+bool asks_to_explain(std::string_view json) { return asks_of_frames(json, "explain"); }
 
 core::Result<ExplainQuestion> explain_question_from_json(std::string_view json) {
-  PRESCENE_TRY(const Json document, parse_json(json, kLongestExplainQuestion));
-  JsonErrors errors;
-  ExplainQuestion question;
-  {
-    JsonObject object({document, "", errors});
-    if (const auto id = object.find("id")) {
-      question.id = id->text();
-      if (question.id.size() > kLongestId)
-        id->fail("the text has " + std::to_string(question.id.size()) + " bytes: give at most " +
-                 std::to_string(kLongestId));
-    }
-    if (const auto stream = object.find("stream")) question.stream = stream->boolean();
-    if (const auto asked = object.require("explain")) read_fields(*asked, question);
-  }
-  if (!errors.ok()) return errors.status();
-  return question;
+  return question_of_frames<ExplainQuestion>(json, "explain", read_fields);
 }
 
 Json to_json(const ExplainQuestion& question) {

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // JSON of the question why a pose is believed, both ways.
-#include "json_values.h"
+#include "json_frames_question.h"
 #include "prescene/belief/explain_question.h"
-#include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/belief/validation.h"
 #include "prescene/belief/why_question.h"
 
 namespace prescene::belief {
 namespace {
-
-constexpr std::size_t kLongestWhyQuestion = std::size_t{1} << 16;
 
 void read_against(const JsonAt& at, WhyQuestion& question) {
   if (at.value.is_object()) {
@@ -37,15 +34,10 @@ void read_why(const JsonAt& at, WhyQuestion& question) {
                  std::to_string(kLongestName));
   }
   if (const auto against = fields.find("against")) read_against(*against, question);
-  question.from = read_number(fields, "from", kWindowEnds);
-  question.to = read_number(fields, "to", kWindowEnds);
-  question.last = read_number(fields, "last", kWindowSeconds);
-  if (question.from.has_value() != question.to.has_value())
-    at.fail("'from' and 'to' go together: give both, or 'last'");
-  else if (question.from && question.last)
-    at.fail("'last' and 'from' are two windows: give one of them");
-  else if (question.from && !(*question.from < *question.to))
-    at.fail("'from' is not before 'to': exchange them");
+  const WindowFields window = read_window(at, fields);
+  question.from = window.from;
+  question.to = window.to;
+  question.last = window.last;
   if (const auto images = fields.find("images")) question.images = static_cast<int>(images->integer(0, kMostWhyImages));
   if (const auto effort = fields.find("effort")) {
     JsonObject limits(*effort);
@@ -69,31 +61,10 @@ const char* name_of(WhyAgainst against) {
   return "";
 }
 
-bool asks_why(std::string_view json) {
-  // Looked for first, as most questions are others and need not be parsed twice.
-  // A backslash may write the key in another way.
-  if (json.find("\"why\"") == std::string_view::npos && json.find('\\') == std::string_view::npos) return false;
-  const auto document = parse_json(json, kLongestWhyQuestion);
-  return document && document->is_object() && document->contains("why");
-}
+bool asks_why(std::string_view json) { return asks_of_frames(json, "why"); }
 
 core::Result<WhyQuestion> why_question_from_json(std::string_view json) {
-  PRESCENE_TRY(const Json document, parse_json(json, kLongestWhyQuestion));
-  JsonErrors errors;
-  WhyQuestion question;
-  {
-    JsonObject object({document, "", errors});
-    if (const auto id = object.find("id")) {
-      question.id = id->text();
-      if (question.id.size() > kLongestId)
-        id->fail("the text has " + std::to_string(question.id.size()) + " bytes: give at most " +
-                 std::to_string(kLongestId));
-    }
-    if (const auto stream = object.find("stream")) question.stream = stream->boolean();
-    if (const auto asked = object.require("why")) read_why(*asked, question);
-  }
-  if (!errors.ok()) return errors.status();
-  return question;
+  return question_of_frames<WhyQuestion>(json, "why", read_why);
 }
 
 Json to_json(const WhyQuestion& question) {

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// JSON that questions about frames that were seen have in common: their window, and what is around their key.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "json_values.h"
+#include "prescene/belief/json.h"
+#include "prescene/belief/query_limits.h"
+
+namespace prescene::belief {
+
+inline constexpr std::size_t kLongestFramesQuestion = std::size_t{1} << 16;  // bytes
+
+/// The keys `from` and `to`, or `last`, s: of what frames a question is asked.
+struct WindowFields {
+  std::optional<double> from, to, last;
+};
+/// `at`: the object of these fields, where an error about several of them is.
+WindowFields read_window(const JsonAt& at, JsonObject& fields);
+/// Whether a text is a question about frames that were seen, with this key.
+bool asks_of_frames(std::string_view json, std::string_view key);
+/// Such a question: its `id` and `stream`, and what `read(JsonAt, Question&)` takes from its key.
+template <class Question, class Read>
+core::Result<Question> question_of_frames(std::string_view json, const std::string& key, Read read) {
+  PRESCENE_TRY(const Json document, parse_json(json, kLongestFramesQuestion));
+  JsonErrors errors;
+  Question question;
+  {
+    JsonObject object({document, "", errors});
+    if (const auto id = object.find("id")) {
+      question.id = id->text();
+      if (question.id.size() > kLongestId)
+        id->fail("the text has " + std::to_string(question.id.size()) + " bytes: give at most " +
+                 std::to_string(kLongestId));
+    }
+    if (const auto stream = object.find("stream")) question.stream = stream->boolean();
+    if (const auto asked = object.require(key)) read(*asked, question);
+  }
+  if (!errors.ok()) return errors.status();
+  return question;
+}
+
+}  // namespace prescene::belief
