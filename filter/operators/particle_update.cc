@@ -130,7 +130,7 @@ Mode ParticleUpdate::climb(const Pose& X_WO_predicted, const Gaussian& predicted
   std::optional<Outline> own_outline;
   const Outline* outline = outline_near(mode.X_WO, own_outline);
   FrameEquations equations;
-  /// Newton's step towards the mode; how far it went, and zero where there is none.
+  // Newton's step towards the mode; how far it went, and zero where there is none.
   const auto step_on = [&] {
     const Vector6d gradient = equations.gradient - predicted.information * mode.shift;
     Vector6d d = geometry::Cholesky6(predicted.information + equations.information).solve(gradient);
@@ -147,11 +147,16 @@ Mode ParticleUpdate::climb(const Pose& X_WO_predicted, const Gaussian& predicted
     const Vector6d d = step_on();
     if (d.isZero(0.0) || (is_near(d, 1e-5, 1e-4) && t == 1.0)) break;
   }
-  const Matrix6d claimed = geometry::Cholesky6(predicted.information + equations.information).inverse();
-  if (keep_confirmed(mode.X_WO, claimed, equations)) step_on();
-  const geometry::Cholesky6 cholesky(predicted.information + equations.information);
-  mode.covariance = cholesky.inverse();
-  mode.log_determinant = -2.0 * cholesky.factor().diagonal().array().log().sum();
+  const auto measure_spread = [&] {
+    const geometry::Cholesky6 cholesky(predicted.information + equations.information);
+    mode.covariance = cholesky.inverse();
+    mode.log_determinant = -2.0 * cholesky.factor().diagonal().array().log().sum();
+  };
+  measure_spread();
+  if (keep_confirmed(mode.X_WO, mode.covariance, equations)) {
+    step_on();
+    measure_spread();
+  }
   return mode;
 }
 
