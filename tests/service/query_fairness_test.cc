@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -67,7 +68,9 @@ TEST(QueryFairness, WhileOnesLongQuestionIsSimulatedAnothersIsAnswered) {
     EXPECT_EQ(id_of(answers.back()), std::to_string(i)) << "of one client, one question at most is in work";
   }
   worker.ask(R"({"cancel": "endless"})", "modest");
-  EXPECT_EQ(id_of(worker.answers(7).back()), "next");
+  // Another thread may be done with the next one while the first's refusal is on its way.
+  const auto answers = worker.answers(7);
+  EXPECT_THAT((std::array{id_of(answers[5]), id_of(answers[6])}), testing::UnorderedElementsAre("endless", "next"));
 }
 
 TEST(QueryFairness, OfTenThousandQuestionsEachIsAnsweredRefusedWithTheBoundOrCounted) {
