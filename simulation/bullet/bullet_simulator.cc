@@ -16,7 +16,7 @@
 namespace prescene::simulation {
 namespace {
 
-constexpr std::uint32_t kSnapshotVersion = 0x62540003;
+constexpr std::uint32_t kSnapshotVersion = 0x62540004;
 // Between two looks at whether the run is cancelled; a step of a crowded scene takes 10 ms.
 constexpr std::int64_t kCancellationTurns = 16;
 

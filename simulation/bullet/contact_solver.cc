@@ -107,21 +107,20 @@ ContactSolver::Contact ContactSolver::make_contact(const SolverContact& given, b
     c.rolling_step = 1.0 / trace;
   }
 
-  const btScalar speed = relative_velocity(n, c.normal.torque_a, c.normal.torque_b, a, b);
-  const bool closes = given.gap + 0.5 * dt * (given.speed_before + speed) < 0.0;
+  const btScalar acceleration = given.acceleration - given.turning / dt;
   c.target = given.gap > 0.0 ? -given.gap / dt : 0.0;
-  c.hit = closes && given.speed_before < -settings_.restitution_speed;
+  c.hit = given.hit;
   if (c.hit) {
     // The gap closes at hit_time with the speed it has then; what bounces goes on under gravity until the step ends. A
     // bounce that falls back within the step is none.
-    const btScalar acceleration = (speed - given.speed_before) / dt;
     c.hit_time = given.gap > 0.0 ? time_to_close(given.gap, given.speed_before, acceleration, dt) : 0.0;
     const btScalar speed_at_hit = given.speed_before + acceleration * c.hit_time;
     c.target = std::max(0.0, -given.restitution * speed_at_hit + acceleration * (dt - c.hit_time));
     c.bounced = c.target > 0.0;
+    if (c.bounced) c.target -= given.fall;
   }
   c.push_target = given.gap > 0.0 ? -given.gap / dt : -given.gap * settings_.overlap_recovery / dt;
-  const bool impact = closes && given.speed_before < -settings_.impact_speed;
+  const bool impact = closes(given, dt) && given.speed_before < -settings_.impact_speed;
   c.mu = impact ? given.impact_friction : given.friction;
   return c;
 }

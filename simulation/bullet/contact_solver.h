@@ -41,16 +41,23 @@ struct SolverContact {
   double rolling_arm = 0.0;  ///< m
   /// Normal velocity (A minus B) before this step's gravity, m/s; negative while closing.
   double speed_before = 0.0;
-  double turning = 0.0;  ///< m/s, in speed_before: what the turning of the bodies adds (ContactPoint::turning).
+  double fall = 0.0;          ///< m/s: what gravity still adds to the normal velocity until the step ends.
+  double acceleration = 0.0;  ///< m/s^2: of the normal velocity while nothing presses.
+  double turning = 0.0;       ///< m/s, in speed_before: what the turning of the bodies adds (ContactPoint::turning).
   /// In: the impulses of the step before (N s). Out: this step's.
   double impulse = 0.0;
   Vector3d friction_impulse = Vector3d::Zero();
-  /// Out: the contact closed in this step, so its impulse says nothing about the next step; and it bounced.
+  /// It closes in this step, so its impulse says nothing about the next step. Out: and presses.
   bool hit = false;
-  bool bounced = false;
+  bool bounced = false;  ///< Out.
   /// Out, of a hit: when within the step the gap closed, s.
   double hit_time = 0.0;
 };
+
+/// Whether the gap closes within `dt` seconds if nothing presses.
+inline bool closes(const SolverContact& c, double dt) {
+  return c.gap + dt * (c.speed_before + 0.5 * (dt * c.acceleration - c.turning)) < 0.0;
+}
 
 /// One joint of a step. A is the child, B the parent. Vectors in W.
 struct SolverJoint {

@@ -34,7 +34,7 @@ void InstanceWorld::sweep(int index) {
   const Bounds box = parts_box(index, m.X_WO);
   m.low = box.low;
   m.high = box.high;
-  const double speed = std::max(m.velocity.norm(), m.velocity_before.norm());
+  const double speed = std::max((m.velocity + m.fall).norm(), m.velocity_before.norm());
   const double spin = std::max(m.spin.norm(), m.spin_after.norm());
   m.travel = part_ * (speed + spin * (body.radius + (m.p_WCm - m.X_WO.p).norm()));
   const Vector3d swell = Vector3d::Constant(m.travel + 0.5 * kContactMargin);
@@ -171,10 +171,16 @@ void InstanceWorld::inherit(std::size_t first, std::uint64_t key, double reach) 
       heir = i;
     }
     if (heir == contacts_.size()) continue;
-    // A guess, never more than it was: an impact that something at rest bore was as much in a part of a step.
-    contacts_[heir].impulse += share() * warm.impulse;
-    contacts_[heir].friction_impulse += share() * warm.friction_impulse;
+    contacts_[heir].impulse += warm.impulse;
+    contacts_[heir].friction_impulse += warm.friction_impulse;
   }
+}
+
+/// By how much the normal velocity that a contact acts on differs from that before, while nothing presses, m/s.
+double InstanceWorld::free_change(const SolverContact& c) const {
+  const Moving& a = moving_[static_cast<std::size_t>(c.body_a)];
+  const Moving& b = moving_[static_cast<std::size_t>(c.body_b)];
+  return c.normal.dot(a.velocity - a.velocity_before - b.velocity + b.velocity_before);
 }
 
 /// How fast the normal velocity of a contact grows while nothing presses, m/s^2.
@@ -220,12 +226,38 @@ void InstanceWorld::fill_bodies() {
   }
 }
 
+/// What a contact hits starts from its velocity as the step begins: what bore it since the middle of the step before
+/// may let it go, and has done its share until then.
+void InstanceWorld::note_struck() {
+  for (Moving& m : moving_) m.struck = false;
+  for (SolverContact& c : contacts_) {
+    const Moving& a = moving_[static_cast<std::size_t>(c.body_a)];
+    const Moving& b = moving_[static_cast<std::size_t>(c.body_b)];
+    c.fall = c.normal.dot(a.fall - b.fall);
+    c.acceleration = free_acceleration(c);
+    c.hit = closes(c, part_) && c.speed_before < -settings_.restitution_speed;
+    if (!c.hit) continue;
+    for (const int body : {c.body_a, c.body_b}) moving_[static_cast<std::size_t>(body)].struck = true;
+  }
+  for (std::size_t i = 0; i < objects_.size(); ++i)
+    if (moving_[i].struck && moving_[i].dynamic) begin_anew(i);
+  for (SolverContact& c : contacts_) {
+    // A guess, never more than it was: an impact that something at rest bore was as much in a part of a step.
+    const double pulled = std::max(moving_[static_cast<std::size_t>(c.body_a)].pulled,
+                                   moving_[static_cast<std::size_t>(c.body_b)].pulled);
+    const double share = std::min(1.0, pulled / dt());
+    c.impulse *= share;
+    c.friction_impulse *= share;
+  }
+}
+
 bool InstanceWorld::solve(const core::Cancellation* cancellation) {
   // What stays open throughout, the solver would leave as it is.
   const auto stays_open = [&](const SolverContact& c) {
-    const double speed = c.speed_before - c.turning + part_ * free_acceleration(c);
+    const double speed = c.speed_before - c.turning + free_change(c);
     return c.gap > 0.0 && c.impulse == 0.0 && c.gap + part_ * speed > 0.0;
   };
+  note_struck();
   list_joints();
   if (joints_.empty() && std::all_of(contacts_.begin(), contacts_.end(), stays_open)) {
     for (BodyResult& result : results_) result = BodyResult{};

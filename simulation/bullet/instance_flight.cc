@@ -24,8 +24,9 @@ constexpr double kFastest = 1e3;
 InstanceWorld::Flight InstanceWorld::flight_of(const Object& object, const CompiledBody& body) const {
   // Without contact a step ends here.
   Flight flight;
-  flight.v_WCm = object.v_WCm + part_ * pull_on(object);
-  flight.p_WCm = object.p_WCm + 0.5 * part_ * (object.v_WCm + flight.v_WCm);
+  const Vector3d v_WCm = begun(object);
+  flight.v_WCm = v_WCm + part_ * pull_on(object);
+  flight.p_WCm = object.p_WCm + 0.5 * part_ * (v_WCm + flight.v_WCm);
   const Vector3d w_WO = object.loaded ? Vector3d(object.w_WO + part_ * object.spin_up) : object.w_WO;
   const Spin spin = spun(object.R_WO, w_WO, body, part_);
   flight.R_WO = spin.R_WO;
@@ -38,7 +39,7 @@ bool InstanceWorld::list_flyers() {
   for (int i = 0; i < scene_->object_count; ++i) {
     const Object& object = objects_[static_cast<std::size_t>(i)];
     if (object.frozen) continue;
-    if (object.held) return false;
+    if (object.held || object.lag > 0.0) return false;
     const CompiledBody& body = scene_->bodies[static_cast<std::size_t>(i)];
     Flyer flyer;
     flyer.object = i;

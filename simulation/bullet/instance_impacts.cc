@@ -45,8 +45,6 @@ void InstanceWorld::shorten(int parts) {
     c.gap -= 0.5 * before * c.turning * (1.0 - ratio * ratio);
     c.speed_before -= c.turning * (1.0 - ratio);
     c.turning *= ratio;
-    c.impulse *= ratio;
-    c.friction_impulse *= ratio;
   }
 }
 

@@ -22,6 +22,10 @@ void InstanceWorld::save(ByteWriter& out) const {
     out.value(object.physical.friction);
     out.value(object.physical.impact_friction);
     out.value(object.physical.restitution);
+    out.vector(object.v_middle);
+    out.vector(object.w_middle);
+    out.value(object.lag);
+    out.value(object.owed);
     out.value(object.calm_steps);
     out.value(object.held);
     out.value(object.frozen);
@@ -63,6 +67,10 @@ bool InstanceWorld::restore(ByteReader& in) {
     object.physical.friction = in.value<double>();
     object.physical.impact_friction = in.value<double>();
     object.physical.restitution = in.value<double>();
+    object.v_middle = in.vector();
+    object.w_middle = in.vector();
+    object.lag = in.value<double>();
+    object.owed = in.value<double>();
     object.calm_steps = in.value<int>();
     object.held = in.value<bool>();
     object.frozen = in.value<bool>();

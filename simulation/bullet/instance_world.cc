@@ -157,6 +157,7 @@ void InstanceWorld::set_free(const std::vector<ActionPlayer::Released>& released
     Object& object = objects_[static_cast<std::size_t>(event.object)];
     object.w_WO = event.V_WO.angular;
     object.v_WCm = event.V_WO.linear + event.V_WO.angular.cross(object.R_WO * object.physical.center_of_mass);
+    object.lag = object.owed = 0.0;
     object.calm_steps = 0;
     for (int r = 0; r < scene_->robot_count; ++r) {
       parting_[static_cast<std::size_t>(event.object * scene_->robot_count + r)] = 1;
@@ -186,6 +187,8 @@ void InstanceWorld::load_objects() {
     const Vector3d spin = world_inertia(object.R_WO, body, object.physical.mass).inverse() * load.turn;
     object.calm_steps = 0;
     if (load.blow) {
+      object.v_WCm = begun(object);
+      object.lag = object.owed = 0.0;
       object.v_WCm += velocity;
       object.w_WO += spin;
       continue;
@@ -207,6 +210,8 @@ void InstanceWorld::place_kinematic() {
     m.spin = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt();
     m.velocity_before = m.velocity;
     m.spin_before = m.spin_after = m.spin;
+    m.fall = Vector3d::Zero();
+    m.pulled = 0.0;
     m.dynamic = false;
     m.present = true;
     sweep(body);
@@ -228,6 +233,7 @@ void InstanceWorld::place_kinematic() {
     Moving& m = moving_[static_cast<std::size_t>(i)];
     object.v_WCm = m.velocity + m.spin.cross(object.p_WCm - m.p_WCm);
     object.w_WO = m.spin;
+    object.lag = object.owed = 0.0;
   }
 }
 
@@ -242,14 +248,56 @@ void InstanceWorld::place_dynamic() {
     m.dynamic = true;
     m.X_WO = Frame(object_pose(object));
     m.p_WCm = object.p_WCm;
-    m.velocity = flight.v_WCm;
-    // Contacts act at the step's beginning, on the spin of there: its energy is that of this pose.
-    m.spin = object.loaded ? Vector3d(object.w_WO + part_ * object.spin_up) : object.w_WO;
+    begin_anew(i);
+    if (object.lag > 0.0 && !object.loaded) {
+      m.pulled = object.lag + 0.5 * part_;
+      m.velocity = object.v_middle + m.pulled * scene_->scene.gravity_W;
+      m.spin = object.w_middle;
+    }
     m.spin_before = object.w_WO;
     m.velocity_before = object.v_WCm;
     m.spin_after = flight.w_WO;
     sweep(static_cast<int>(i));
   }
+}
+
+/// What contacts act on in an object's step, from its velocities as the step begins.
+void InstanceWorld::begin_anew(std::size_t i) {
+  const Object& object = objects_[i];
+  Moving& m = moving_[i];
+  // What hands and joints do is meant for the whole step; what falls is taken at the middle of it.
+  const bool whole = object.loaded || jointed_[i] != 0;
+  m.fall = whole ? Vector3d(Vector3d::Zero()) : Vector3d(0.5 * part_ * scene_->scene.gravity_W);
+  m.velocity = flights_[i].v_WCm - m.fall;
+  m.pulled = object.owed + (whole ? 1.0 : 0.5) * part_;
+  // Contacts act at the step's beginning, on the spin of there: its energy is that of this pose.
+  m.spin = object.loaded ? Vector3d(object.w_WO + part_ * object.spin_up) : object.w_WO;
+}
+
+/// After a step in which contacts or joints acted on an object: `spin` is its new attitude and spin.
+void InstanceWorld::keep_velocity(std::size_t i, const Spin& spin, bool borne, bool hit) {
+  Object& object = objects_[i];
+  const Moving& m = moving_[i];
+  const Vector3d middle = from_bullet(rigid_[i]->getLinearVelocity());
+  object.R_WO = spin.R_WO;
+  object.w_WO = spin.w_WO;
+  object.v_WCm = middle;
+  object.lag = object.owed = 0.0;
+  if (!borne || object.loaded) {
+    object.v_WCm += m.fall;
+    return;
+  }
+  object.v_middle = middle;
+  object.w_middle = spin.w_WO;
+  object.lag = 0.5 * part_;
+  if (hit) {
+    object.owed = object.lag;
+    return;
+  }
+  // What bears it goes on as it did since the middle of the step before.
+  const double ahead = object.lag / m.pulled;
+  object.v_WCm += ahead * (middle - m.velocity + m.pulled * scene_->scene.gravity_W);
+  object.w_WO += ahead * (from_bullet(rigid_[i]->getAngularVelocity()) - m.spin);
 }
 
 void InstanceWorld::integrate() {
@@ -286,19 +334,20 @@ void InstanceWorld::integrate() {
       const double before = impact.time.value_or(0.0);
       const double after = part_ - before;
       const Vector3d gravity = pull_on(object);
-      const double falls_before = impact.supported ? 0.0 : 0.5 * before;
-      const double falls_after = impact.supported || !impact.bounced ? 0.0 : -0.5 * after;
-      const Vector3d flown = before * (object.v_WCm + falls_before * gravity);
-      object.v_WCm = from_bullet(rigid_[i]->getLinearVelocity());
-      object.p_WCm += flown + after * (object.v_WCm + falls_after * gravity) + part_ * result.push;
+      const bool flies_on = impact.bounced && !impact.supported;
+      const Vector3d flown =
+          before * (impact.supported ? object.v_WCm : Vector3d(begun(object) + 0.5 * before * gravity));
+      const Vector3d middle = from_bullet(rigid_[i]->getLinearVelocity());
+      const Vector3d fallen = flies_on ? Vector3d(moving_[i].fall - 0.5 * after * gravity) : Vector3d(Vector3d::Zero());
+      object.p_WCm += flown + after * (middle + fallen) + part_ * result.push;
       const Vector3d w = from_bullet(rigid_[i]->getAngularVelocity());
       const CompiledBody& body = scene_->bodies[i];
       const Spin spin =
           turned(spun(object.R_WO, w, body, part_), before * (moving_[i].spin - w) + part_ * result.turn, body);
-      object.R_WO = spin.R_WO;
-      object.w_WO = spin.w_WO;
+      keep_velocity(i, spin, !flies_on, impact.time.has_value());
     } else {
       object.v_WCm = flight.v_WCm;
+      object.lag = object.owed = 0.0;
       object.p_WCm = flight.p_WCm + part_ * result.push;
       Spin spin{flight.R_WO, flight.w_WO};
       if (!result.turn.isZero(0.0)) spin = turned(spin, part_ * result.turn, scene_->bodies[i]);

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "body_motion.h"
 #include "compiled_scene.h"
 #include "contact_finder.h"
 #include "contact_solver.h"
@@ -101,6 +102,12 @@ class InstanceWorld {
     Vector3d v_WCm = Vector3d::Zero();
     Vector3d w_WO = Vector3d::Zero();
     belief::PhysicalParameters physical;
+    // Of what is borne: the velocities in the middle of the step before (docs/reference/simulation.md), from which the
+    // next step goes on. What is not has no lag.
+    Vector3d v_middle = Vector3d::Zero();
+    Vector3d w_middle = Vector3d::Zero();
+    double lag = 0.0;   // s: by how much they are older than the pose
+    double owed = 0.0;  // s: for how long gravity has not acted in v_WCm yet
     int calm_steps = 0;
     bool held = false;
     bool frozen = false;
@@ -116,10 +123,13 @@ class InstanceWorld {
   /// Geometry and motion of any body during a step.
   struct Moving {
     Frame X_WO;
-    Vector3d p_WCm = Vector3d::Zero();  // what velocities refer to
-    Vector3d velocity = Vector3d::Zero();
+    Vector3d p_WCm = Vector3d::Zero();     // what velocities refer to
+    Vector3d velocity = Vector3d::Zero();  // that contacts act on
     Vector3d spin = Vector3d::Zero();
     Vector3d velocity_before = Vector3d::Zero();  // without this step's gravity and hands
+    Vector3d fall = Vector3d::Zero();  // what gravity adds to `velocity` until the end, with nothing in the way
+    double pulled = 0.0;               // s: for how long gravity has acted in `velocity`
+    bool struck = false;               // something hits it in this part of a step
     Vector3d spin_before = Vector3d::Zero();
     Vector3d spin_after = Vector3d::Zero();  // with nothing in the way
     Vector3d low, high;                      // bounding box swept over the step
@@ -178,6 +188,11 @@ class InstanceWorld {
   }
   void place_kinematic();
   void place_dynamic();
+  /// Its velocity where a step begins.
+  Vector3d begun(const Object& object) const { return object.v_WCm + object.owed * scene_->scene.gravity_W; }
+  void keep_velocity(std::size_t object, const Spin& spin, bool borne, bool hit);
+  void begin_anew(std::size_t body);
+  void note_struck();
   /// After what is taken of a step now.
   Flight flight_of(const Object& object, const CompiledBody& body) const;
   bool list_flyers();
@@ -190,6 +205,7 @@ class InstanceWorld {
   void find_parts(const Part& part_a, const Moving& ma, const Part& part_b, const Moving& mb, double range);
   void add_contacts(int a, int b, std::uint32_t part_a, std::uint32_t part_b);
   void inherit(std::size_t first, std::uint64_t key, double reach);
+  double free_change(const SolverContact& contact) const;
   double free_acceleration(const SolverContact& contact) const;
   bool solve(const core::Cancellation* cancellation);
   void integrate();

@@ -79,8 +79,9 @@ void fly_lanes(const LockstepScene* scene, int object, const std::span<const std
     const Vec3<V> w = load(state->w, at);
     const Quat<V> q = load(state->q, at);
     // A parabola, and a turn that keeps the angular momentum.
-    const Vec3<V> flown_v = v + gravity * dt;
-    const Vec3<V> flown_p = p + (v + flown_v) * half_dt;
+    const Vec3<V> begun_v = v + gravity * hn::Load(d, state->owed + at);
+    const Vec3<V> flown_v = begun_v + gravity * dt;
+    const Vec3<V> flown_p = p + (begun_v + flown_v) * half_dt;
     const Mat3<V> R = matrix_of(q);
     const Spin<V> flown = spun(body, Spin<V>{q, transposed(R, w)}, share);
     const Vec3<V> flown_w = rotated(flown.q, flown.w_P);
@@ -255,6 +256,7 @@ void land(std::span<const std::int32_t> objects, LaneState& state) {
       state.w[i][at] = state.flown_w[i][at];
     }
     for (std::size_t i = 0; i < 4; ++i) state.q[i][at] = state.flown_q[i][at];
+    state.lag[at] = state.owed[at] = Real(0);
   }
 }
 

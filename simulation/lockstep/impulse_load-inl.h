@@ -160,8 +160,8 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
   const V one = set<V>(1.0);
   const ObjectLanes& a = object(group.a);
   const ObjectLanes& b = object(kPair ? group.b : group.a);
-  V speed = along<kPair>(axis<kPair>(row, kNormal), a.flown, b.flown);
   V speed_before = along<kPair>(axis<kPair>(row, kNormal), a.before, b.before) + turning;
+  V speed = along<kPair>(axis<kPair>(row, kNormal), a.flown, b.flown);
   V base_1 = along<kPair>(axis<kPair>(row, kTangent1), a.flown, b.flown);
   V base_2 = along<kPair>(axis<kPair>(row, kTangent2), a.flown, b.flown);
   if constexpr (!kPair) {
@@ -191,15 +191,18 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
   const V per_dt = set<V>(1.0 / settings_.dt) / a.share;
   put(row, kAtEnd, gap + dt * hn::Min(zero, speed_before));
   const V half = set<V>(0.5);
-  V acceleration = (speed - speed_before) * per_dt;
+  const V along_gravity = dot(get3(row, kNormal), set3<V>(settings_.gravity));
+  V falling = one;
   if constexpr (kMany) {
-    // What else holds up one of the two does not fall with the other.
-    const V along_gravity = dot(get3(row, kNormal), set3<V>(settings_.gravity));
+    falling = hn::IfThenElseZero(hn::Gt(a.inverse_mass, zero), one);
     put(row, kUpward, along_gravity * set<V>(-1.0 / std::max(settings_.gravity_size, 1e-30)));
     if constexpr (kPair) {
-      acceleration = acceleration + along_gravity * (held_up(group.b, group.a) - held_up(group.a, group.b));
+      // What else holds up one of the two does not fall with the other.
+      falling = falling - hn::IfThenElseZero(hn::Gt(b.inverse_mass, zero), one);
+      falling = falling + held_up(group.b, group.a) - held_up(group.a, group.b);
     }
   }
+  const V acceleration = along_gravity * falling - turning * per_dt;
   const auto closes = hn::Lt(gap + dt * (speed_before + half * dt * acceleration), zero);
   const auto open = hn::Gt(gap, zero);
   const V close_by = hn::Neg(gap) * per_dt;
@@ -210,8 +213,13 @@ void ContactRows<kMany>::load_motion(const RowGroup& group, int row, const Vec3<
   const V hit_time = hn::IfThenElseZero(hn::And(hit, open), time_to_close(gap, speed_before, acceleration, dt));
   const V speed_at_hit = speed_before + acceleration * hit_time;
   const V bounce = hn::Max(zero, acceleration * (dt - hit_time) - a.restitution * other_restitution * speed_at_hit);
-  const V target = select(hit, bounce, resting);
+  const V bounced_to = select(hn::Gt(bounce, zero), bounce - half * dt * along_gravity * falling, zero);
+  const V target = select(hit, bounced_to, resting);
   put(row, kTarget, target - speed);
+  for (const int body : {group.a, kPair ? group.b : group.a}) {
+    V& struck = objects_[body].struck;
+    struck = select(hit, one, struck);
+  }
   put(row, kHit, hn::IfThenElseZero(hit, one));
   put(row, kBounced, hn::IfThenElseZero(hn::And(hit, hn::Gt(bounce, zero)), one));
   put(row, kHitTime, hit_time);

@@ -81,7 +81,14 @@ struct ObjectLanes {
   Mat3<V> R;
   Vec3<V> p;
   Rates before, flown;
+  Vec3<V> falling;  // m/s: velocity at the end if nothing is in the way
   V friction, impact_friction, restitution, travel, share;
+  V owed;      // s: for how long gravity has not acted yet in `before`
+  V pulled;    // s: for how long it has acted in `flown`
+  V falls;     // s: for how long it still acts in this step if nothing is in the way
+  V struck;    // 1 or 0: something hits it
+  Rates anew;  // `flown` of what something hits
+  V anew_pulled;
   V inverse_mass;
   Vec3<V> root, inverse_root;  // of the moments
 };
@@ -207,6 +214,7 @@ class ContactRows {
   /// `on_other_W` is the place of the other's surface from the middle of a.
   void load_motion(const RowGroup& group, int row, const Vec3<V>& on_other_W, V gap, V turning, V other_restitution,
                    V other_impact, V other_friction);
+  void begin_struck_anew();
   void load_others(int row, Others& others) const;
   void note_supports();
   /// 1 in the lanes in which something else than `but` held an object up in the last step.
@@ -274,14 +282,34 @@ void ContactRows<kMany>::load_objects() {
     o.R = {{entry(0), entry(1), entry(2)}, {entry(3), entry(4), entry(5)}, {entry(6), entry(7), entry(8)}};
     o.p = lanes_of(state_.p, index);
     o.before = {lanes_of(state_.v, index), times(transposed(o.R, lanes_of(state_.w, index)), o.root)};
-    // Contacts act at the step's beginning, on the spin of there: its energy is that of this pose.
-    o.flown = {lanes_of(state_.flown_v, index), o.before.spin};
     o.friction = lanes_of(state_.friction, index);
     o.impact_friction = lanes_of(state_.impact_friction, index);
     o.restitution = lanes_of(state_.restitution, index);
     o.travel = lanes_of(state_.travel, index);
     o.share = lanes_of(state_.share, index);
-    if constexpr (kMany) o.inverse_mass = lanes_of(state_.inverse_mass, index);
+    const Vec3<V> gravity = set3<V>(settings_.gravity);
+    const V lag = lanes_of(state_.lag, index);
+    const V dt = set<V>(settings_.dt) * o.share;
+    o.owed = lanes_of(state_.owed, index);
+    o.falls = set<V>(0.5 * settings_.dt) * o.share;
+    o.anew_pulled = o.owed + o.falls;
+    const auto borne = hn::Gt(lag, set<V>(0.0));
+    o.pulled = select(borne, lag + o.falls, o.anew_pulled);
+    o.falling = o.before.velocity + gravity * o.owed + gravity * dt;  // as it flies
+    if constexpr (kMany) {
+      o.inverse_mass = lanes_of(state_.inverse_mass, index);
+      const auto moves = hn::Gt(o.inverse_mass, set<V>(0.0));
+      o.falls = hn::IfThenElseZero(moves, o.falls);
+      o.pulled = hn::IfThenElseZero(moves, o.pulled);
+      o.anew_pulled = hn::IfThenElseZero(moves, o.anew_pulled);
+      o.falling = select(moves, o.falling, o.before.velocity);
+    }
+    // Contacts act on the velocity of the step's middle, and on the spin of its beginning, whose energy is that of this
+    // pose.
+    o.anew = {o.falling - gravity * o.falls, o.before.spin};
+    o.flown = {select(borne, lanes_of(state_.middle_v, index) + gravity * o.pulled, o.anew.velocity),
+               select(borne, times(transposed(o.R, lanes_of(state_.middle_w, index)), o.root), o.anew.spin)};
+    o.struck = set<V>(0.0);
   }
 }
 
@@ -299,6 +327,45 @@ void ContactRows<kMany>::load(std::span<const std::int32_t> slots) {
         load_row<kMany>(group, row);
       } else {
         load_row<false>(group, row);
+      }
+    }
+  }
+  begin_struck_anew();
+}
+
+/// What something hits starts from its velocity as the step begins: what bore it since the middle of the step before
+/// may let it go, and has done its share until then.
+template <bool kMany>
+void ContactRows<kMany>::begin_struck_anew() {
+  const V zero = set<V>(0.0);
+  const Vec3<V> none = set3<V>(0.0, 0.0, 0.0);
+  Rates changes[kObjects];
+  auto any = hn::Lt(zero, zero);
+  for (int index = 0; index < objects(); ++index) {
+    ObjectLanes& o = objects_[index];
+    const auto struck = hn::Gt(o.struck, zero);
+    any = hn::Or(any, struck);
+    changes[index] = {select(struck, o.anew.velocity - o.flown.velocity, none),
+                      select(struck, o.anew.spin - o.flown.spin, none)};
+    o.flown.velocity = select(struck, o.anew.velocity, o.flown.velocity);
+    o.flown.spin = select(struck, o.anew.spin, o.flown.spin);
+    o.pulled = select(struck, o.anew_pulled, o.pulled);
+  }
+  if (hn::AllFalse(D(), any)) return;
+  const auto correct = [&](const RowGroup& group, int row, auto pair) HWY_ATTR {
+    constexpr bool kPair = decltype(pair)::value;
+    const Rates& a = changes[group.a];
+    const Rates& b = changes[kPair ? group.b : group.a];
+    put(row, kTarget, get(row, kTarget) - along<kPair>(axis<kPair>(row, kNormal), a, b));
+    put(row, kBase1, get(row, kBase1) + along<kPair>(axis<kPair>(row, kTangent1), a, b));
+    put(row, kBase2, get(row, kBase2) + along<kPair>(axis<kPair>(row, kTangent2), a, b));
+  };
+  for (const RowGroup& group : groups()) {
+    for (int row = group.first; row < group.first + group.count; ++row) {
+      if (kMany && group.b >= 0) {
+        correct(group, row, std::bool_constant<kMany>());
+      } else {
+        correct(group, row, std::false_type());
       }
     }
   }
@@ -354,7 +421,12 @@ void ContactRows<kMany>::warm_start(Rates* changes) {
     }
     // A contact moves on its bodies by what they slide in a step.
     V reach = object(group.a).travel + set<V>(kSameContact);
-    if (kMany && group.b >= 0) reach = reach + object(group.b).travel;
+    V pulled = object(group.a).pulled;
+    if (kMany && group.b >= 0) {
+      reach = reach + object(group.b).travel;
+      pulled = hn::Max(pulled, object(group.b).pulled);
+    }
+    const V share = hn::Min(set<V>(1.0), pulled * set<V>(1.0 / settings_.dt));
     Rates& a = changes[group.a];
     Rates& b = changes[kMany && group.b >= 0 ? group.b : group.a];
     find_heirs(group, warm_count, reach);
@@ -369,8 +441,8 @@ void ContactRows<kMany>::warm_start(Rates* changes) {
         slip = slip + Vec3<V>{column(4), column(5), column(6)} * counts;
       }
       // A guess, never more than it was: an impact that something at rest bore was as much in a part of a step.
-      impulse = impulse * object(group.a).share;
-      slip = slip * object(group.a).share;
+      impulse = impulse * share;
+      slip = slip * share;
       V slip_1 = dot(slip, get3(row, kTangent1));
       V slip_2 = dot(slip, get3(row, kTangent2));
       const V limit = get(row, kMu) * impulse;

@@ -309,19 +309,25 @@ void LaneSolver<kMany>::finish(int object) {
   const V before = hn::IfThenElseZero(any_hit, hit_time);
   const V after = dt - before;
   const Vec3<V> gravity = set3<V>(settings_.gravity);
-  const V falls_before = hn::IfThenElseZero(hn::Not(supported), half * before);
-  const V falls_after = hn::IfThenElseZero(hn::AndNot(supported, bounced), hn::Neg(half * after));
+  const auto flies_on = hn::Or(hn::Not(touched), hn::AndNot(supported, bounced));
+  const V falls_before = hn::IfThenElseZero(hn::Not(supported), o.owed + half * before);
+  const V falls_after = hn::IfThenElseZero(flies_on, hn::Neg(half * after));
   const Rates& change = changes_[object];
   const Rates& push = pushes_[object];
-  const Vec3<V> new_v = select(touched, o.flown.velocity + change.velocity, o.flown.velocity);
+  // What bears it goes on as it did since the middle of the step before. After a hit that is not known.
+  const Vec3<V> middle_v = o.flown.velocity + change.velocity;
+  const V lag = hn::IfThenZeroElse(flies_on, half * dt);
+  const V on = hn::IfThenZeroElse(hn::Or(flies_on, any_hit), lag * inverse_of(o.pulled));
+  const Vec3<V> reacting_v = middle_v + gravity * hn::IfThenElseZero(flies_on, o.falls);
+  const Vec3<V> ahead_v = reacting_v + (change.velocity + gravity * o.pulled) * on;
   const Vec3<V> push_v = push.velocity * dt;
 
   const Vec3<V> touched_p =
-      o.p + (o.before.velocity + gravity * falls_before) * before + (new_v + gravity * falls_after) * after;
+      o.p + (o.before.velocity + gravity * falls_before) * before + (reacting_v + gravity * falls_after) * after;
   const Vec3<V> new_p = select(touched, touched_p, rows_.lanes_of(state_.flown_p, object)) + push_v;
   // Not touched, it has the spin that it flew with.
   const Vec3<V> change_w = times(change.spin, o.inverse_root);
-  const Spin<V> begun{rows_.lanes_of(state_.q, object), times(o.before.spin, o.inverse_root) + change_w};
+  const Spin<V> begun{rows_.lanes_of(state_.q, object), times(o.flown.spin, o.inverse_root) + change_w};
   const Spin<V> reacting = spun(*o.body, begun, o.share);
   const Quat<V> flown_q = rows_.lanes_of(state_.flown_q, object);
   const Vec3<V> flown_w = rows_.lanes_of(state_.flown_w, object);
@@ -332,9 +338,15 @@ void LaneSolver<kMany>::finish(int object) {
   const Spin<V> spin = turned(*o.body, ahead, rotated(conjugate(ahead.q), o.R * turn));
   const Quat<V>& new_q = spin.q;
   const auto left_alone = hn::AndNot(touched, hn::Eq(dot(turn, turn), zero));
-  const Vec3<V> new_w = select(left_alone, flown_w, rotated(new_q, spin.w_P));
+  const Vec3<V> middle_w = select(left_alone, flown_w, rotated(new_q, spin.w_P));
+  const Vec3<V> new_v = select(touched, ahead_v, o.falling);
+  const Vec3<V> new_w = select(touched, middle_w + o.R * change_w * on, middle_w);
   set_lanes(new_v, state_.v, object);
   set_lanes(new_w, state_.w, object);
+  set_lanes(middle_v, state_.middle_v, object);
+  set_lanes(middle_w, state_.middle_w, object);
+  set_lanes(lag, state_.lag, object);
+  set_lanes(hn::IfThenElseZero(any_hit, lag), state_.owed, object);
   set_lanes(new_p, state_.p, object);
   set_lanes(new_q.w, state_.q[0], object);
   set_lanes(new_q.x, state_.q[1], object);

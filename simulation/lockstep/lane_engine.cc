@@ -80,6 +80,9 @@ void LaneEngine::reset(int slot, const belief::WorldState& start) {
     state_.friction[at] = static_cast<Real>(physical.friction);
     state_.impact_friction[at] = static_cast<Real>(physical.impact_friction);
     state_.restitution[at] = static_cast<Real>(physical.restitution);
+    set_vector(state_.middle_v, at, Vector3d::Zero());
+    set_vector(state_.middle_w, at, Vector3d::Zero());
+    state_.lag[at] = state_.owed[at] = Real(0);
     state_.warm_count[static_cast<std::size_t>(at)] = 0;
     state_.contact_count[static_cast<std::size_t>(at)] = 0;
     Moved& moved = moved_[static_cast<std::size_t>(at)];
@@ -127,7 +130,10 @@ void LaneEngine::move(int from, int to) {
     }
     copy(state_.q, a, b);
     copy(state_.com, a, b);
-    for (Real* row : {state_.friction, state_.impact_friction, state_.restitution, state_.inverse_mass})
+    copy(state_.middle_v, a, b);
+    copy(state_.middle_w, a, b);
+    for (Real* row :
+         {state_.friction, state_.impact_friction, state_.restitution, state_.inverse_mass, state_.lag, state_.owed})
       row[b] = row[a];
     moved_[static_cast<std::size_t>(b)] = moved_[static_cast<std::size_t>(a)];
     const int warm = state_.warm_count[static_cast<std::size_t>(a)];
@@ -146,8 +152,12 @@ void LaneEngine::save(int slot, SlotState& saved) const {
       out.p[i] = state_.p[i][at];
       out.v[i] = state_.v[i][at];
       out.w[i] = state_.w[i][at];
+      out.middle_v[i] = state_.middle_v[i][at];
+      out.middle_w[i] = state_.middle_w[i][at];
     }
     for (std::size_t i = 0; i < 4; ++i) out.q[i] = state_.q[i][at];
+    out.lag = state_.lag[at];
+    out.owed = state_.owed[at];
     out.motion = motion(slot, object);
     out.parting = moved_[static_cast<std::size_t>(at)].parting;
     out.warm_count = state_.warm_count[static_cast<std::size_t>(at)];
@@ -164,8 +174,12 @@ void LaneEngine::restore(int slot, const SlotState& saved) {
       state_.p[i][at] = in.p[i];
       state_.v[i][at] = in.v[i];
       state_.w[i][at] = in.w[i];
+      state_.middle_v[i][at] = in.middle_v[i];
+      state_.middle_w[i][at] = in.middle_w[i];
     }
     for (std::size_t i = 0; i < 4; ++i) state_.q[i][at] = in.q[i];
+    state_.lag[at] = in.lag;
+    state_.owed[at] = in.owed;
     set_motion(slot, object, in.motion);
     moved_[static_cast<std::size_t>(at)].parting = in.parting;
     state_.warm_count[static_cast<std::size_t>(at)] = in.warm_count;
@@ -187,6 +201,7 @@ void LaneEngine::set_motion(int slot, int object, LaneMotion motion) {
   const int at = state_.at(object, slot);
   Moved& moved = moved_[static_cast<std::size_t>(at)];
   moved.motion = motion;
+  if (motion != LaneMotion::kFree) state_.lag[at] = state_.owed[at] = Real(0);
   state_.inverse_mass[at] = motion == LaneMotion::kFree ? moved.inverse_mass : Real(0);
   if (motion != LaneMotion::kFrozen && motion != LaneMotion::kAsleep) return;
   for (std::size_t i = 0; i < 3; ++i) moved.next_p[i] = state_.p[i][at];
@@ -222,6 +237,7 @@ void LaneEngine::release(int slot, int object, const Pose& X_WO, const geometry:
   const Quaterniond R_WP = X_WO.rotation * scene_->R_OP[static_cast<std::size_t>(object)];
   set_vector(state_.v, at, V_WO.linear + V_WO.angular.cross(R_WP * vector_at(state_.com, at)));
   set_vector(state_.w, at, V_WO.angular);
+  state_.lag[at] = state_.owed[at] = Real(0);
   set_motion(slot, object, LaneMotion::kFree);
   Moved& moved = moved_[static_cast<std::size_t>(at)];
   for (const int body : scene_->robot_bodies) {
@@ -237,7 +253,10 @@ void LaneEngine::strike(int slot, int object, double mass, const Vector3d& impul
   const auto& moments = scene_->lanes.bodies[static_cast<std::size_t>(object)].unit_moments;
   const Quaterniond R_WP = rotation(slot, object);
   const Vector3d spin_P = (R_WP.conjugate() * turn).cwiseQuotient(mass * Vector3d(moments[0], moments[1], moments[2]));
-  set_vector(state_.v, at, vector_at(state_.v, at) + impulse / mass);
+  const auto& g = scene_->lanes.settings.gravity;
+  const Vector3d v = vector_at(state_.v, at) + static_cast<double>(state_.owed[at]) * Vector3d(g[0], g[1], g[2]);
+  state_.lag[at] = state_.owed[at] = Real(0);
+  set_vector(state_.v, at, v + impulse / mass);
   if (within > 0.0) set_vector(state_.p, at, vector_at(state_.p, at) - 0.5 * within * impulse / mass);
   set_vector(state_.w, at, vector_at(state_.w, at) + R_WP * spin_P);
 }
@@ -463,6 +482,7 @@ void LaneEngine::nudge(int slot, int object, const Vector3d& axis_W, double angl
   const int at = state_.at(object, slot);
   set_rotation(state_.q, at, (geometry::exp_rotation(angle * axis_W) * rotation(slot, object)).normalized());
   for (std::size_t i = 0; i < 3; ++i) state_.v[i][at] = state_.w[i][at] = Real(0);
+  state_.lag[at] = state_.owed[at] = Real(0);
 }
 
 }  // namespace prescene::simulation

@@ -22,6 +22,7 @@ inline constexpr int kMostFooting = 16;
 struct ObjectSlot {
   Real p[3], v[3], w[3];
   Real q[4];
+  Real middle_v[3], middle_w[3], lag, owed;
   LaneMotion motion;
   std::uint64_t parting;  ///< See LaneEngine::release.
   int warm_count;

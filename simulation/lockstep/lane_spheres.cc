@@ -98,6 +98,10 @@ PlacedPart placed(const LockstepScene& scene, const ConvexPart& part, int body, 
   result.R_WS = result.R_WBody * R_PS;
   result.p_WS = result.center + result.R_WBody * (middle - vector_of(state.com, at));
   result.velocity = object ? vector_of(state.flown_v, at) : vector_of(state.v, at);
+  if (object && state.inverse_mass[at] > 0) {
+    const double falls = 0.5 * scene.settings.dt * static_cast<double>(state.share[at]);
+    result.velocity -= falls * vector_of(scene.settings.gravity);
+  }
   result.spin = vector_of(state.w, at);
   return result;
 }

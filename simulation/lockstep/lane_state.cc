@@ -8,7 +8,7 @@ namespace prescene::simulation {
 LaneState::LaneState(int slots, const LockstepScene& scene)
     : slots_((slots + kLaneMultiple - 1) / kLaneMultiple * kLaneMultiple), room_(scene.room()) {
   const auto bodies = static_cast<int>(scene.bodies.size());
-  constexpr std::size_t kRows = 3 * 3 + 4 + 3 + 4 + 3 * 3 + 4 + 9 + 2 + 3;
+  constexpr std::size_t kRows = 3 * 3 + 4 + 3 + 4 + 2 * 3 + 2 + 3 * 3 + 4 + 9 + 2 + 3;
   const auto size = static_cast<std::size_t>(slots_ * bodies);
   memory_.reset(static_cast<Real*>(::operator new[](kRows* size * sizeof(Real), std::align_val_t{64})));
   std::fill_n(memory_.get(), kRows * size, Real(0));
@@ -27,6 +27,9 @@ LaneState::LaneState(int slots, const LockstepScene& scene)
   rows(q);
   rows(com);
   for (Real** one : {&friction, &impact_friction, &restitution, &inverse_mass}) *one = row();
+  rows(middle_v);
+  rows(middle_w);
+  for (Real** one : {&lag, &owed}) *one = row();
   rows(flown_p);
   rows(flown_v);
   rows(flown_w);

@@ -166,6 +166,10 @@ class LaneState {
   Rows<3> com;      ///< From O to the centre of mass, in P's directions.
   Real *friction, *impact_friction, *restitution;
   Real* inverse_mass;  ///< 1/kg; 0 of what contacts do not move.
+  /// Of what is borne: the velocities in the middle of the step before, from which the next step goes on, and by how
+  /// much they are older than p (s). What is not has no lag. `owed`: for how long gravity has not acted in v yet (s).
+  Rows<3> middle_v, middle_w;
+  Real *lag, *owed;
   // Where free flight (or what moves a kinematic body) ends.
   Rows<3> flown_p, flown_v, flown_w;
   Rows<4> flown_q;

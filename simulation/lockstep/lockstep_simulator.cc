@@ -16,7 +16,7 @@
 namespace prescene::simulation {
 namespace {
 
-constexpr std::uint32_t kSnapshotVersion = 0x4c4b0005;
+constexpr std::uint32_t kSnapshotVersion = 0x4c4b0006;
 
 core::Status wrong_snapshot() {
   return core::invalid_input(
@@ -138,6 +138,10 @@ class LockstepInstance : public Instance {
     all(object.v);
     all(object.w);
     all(object.q);
+    all(object.middle_v);
+    all(object.middle_w);
+    out.value(object.lag);
+    out.value(object.owed);
     out.value(object.motion);
     out.value(object.parting);
     out.value(object.warm_count);
@@ -167,6 +171,10 @@ class LockstepInstance : public Instance {
     all(object.v);
     all(object.w);
     all(object.q);
+    all(object.middle_v);
+    all(object.middle_w);
+    object.lag = in.value<Real>();
+    object.owed = in.value<Real>();
     object.motion = in.value<LaneMotion>();
     object.parting = in.value<std::uint64_t>();
     object.warm_count = in.value<int>();
