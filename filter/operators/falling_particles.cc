@@ -222,6 +222,11 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const Wo
     }
     const belief::ObjectState& end = run.final().objects[place];
     Particle& particle = object.particles[falling[i].particle];
+    if (falling[i].woken && object.state == belief::TrackState::kTracked) {
+      take_if_pushed(end, belief.scene->gravity_W, options, particle, report);
+      ++report.simulated;
+      continue;
+    }
     const geometry::Vector6d motion = geometry::box_minus(end.X_WO, particle.X_WO);
     particle.X_WO = geometry::normalized(end.X_WO);
     particle.V_WO = end.V_WO;

@@ -283,10 +283,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
   PRESCENE_CHECK(dt > 0.0);
   apply_grasps(control, belief);
   begin_pushes(control, dt, belief);
-  const bool all_tracked = std::all_of(belief.objects.begin(), belief.objects.end(), [](const ObjectBelief& object) {
-    return object.state == belief::TrackState::kTracked;
-  });
-  const std::vector<Mover> movers = all_tracked ? std::vector<Mover>() : movers_of(belief, X_WG, dt);
+  const std::vector<Mover> movers = movers_of(belief, X_WG, dt);
 
   Worlds worlds = worlds_of(belief, islands);
   std::vector<Falling> falling;
@@ -303,8 +300,8 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     WorldsOfIsland* const island = worlds.of(i);
     if (island != nullptr) island->begin(i, released.has_value(), object);
     const Vector3d centre = centre_of(*belief.scene, object);
-    // Nothing shows whether what is out of sight is touched: physics says it.
-    const bool may_be_pushed = !tracked && simulators && is_present(object) && !movers.empty();
+    // Physics says whether what rests is touched. Of what is seen some particles stay: the frame tells, too.
+    const bool may_be_pushed = simulators && is_present(object) && !movers.empty();
     const double radius = may_be_pushed ? radius_of(*belief.scene, object) : 0.0;
     for (std::size_t k = 0; k < object.particles.size(); ++k) {
       Particle& particle = object.particles[k];
@@ -330,7 +327,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
       }
       if (particle.mode == MotionMode::kResting) {
         add_noise(tracked ? kStillNoise : options.resting, dt, particle.covariance);
-        if (may_be_pushed && may_touch(movers, particle.X_WO * centre, radius))
+        if (may_be_pushed && physics_draw < physics_share && may_touch(movers, particle.X_WO * centre, radius))
           falling.push_back({i, k, dt, particle.X_WO, particle.V_WO, true});
       } else if (left > 0.0) {
         // What is seen and may be still goes nowhere in one step that its velocity does not say.

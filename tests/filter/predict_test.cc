@@ -439,6 +439,69 @@ TEST_F(Predict, SomeRestingParticlesWakeAndSlowOnesSettle) {
   EXPECT_NEAR(settled / 800.0, PredictOptions().settle_probability, 0.064);
 }
 
+/// A belief of which all particles rest in view, and physics in which the hand takes along what stands in its way.
+belief::Belief resting_in_view() {
+  belief::Belief belief = hand_and_object(MotionMode::kResting, false);
+  belief.objects[0].state = belief::TrackState::kTracked;
+  return belief;
+}
+simulation::SimulatorFactory taking_along(double speed) {
+  return [speed](const belief::Scene&, double) {
+    return by_formula(
+        [speed](const belief::WorldState& start, const simulation::RunRequest& request, core::RandomStream) {
+          belief::WorldState end = start;
+          end.objects[0].V_WO.linear = Vector3d(speed, 0.0, -0.01);  // and settles a little
+          end.objects[0].X_WO.translation += request.stop.duration * end.objects[0].V_WO.linear;
+          return end;
+        });
+  };
+}
+
+TEST_F(Predict, OfWhatRestsInViewPhysicsTakesAShareAlongWithARobotBody) {
+  belief::Belief belief = resting_in_view();
+  const belief::Belief before = belief;
+  const PredictReport report =
+      run(belief, Pose::from_translation({0.15, 0.0, 0.4}), 0.1, without_mode_changes(), {}, taking_along(0.5));
+  int taken = 0;
+  for (std::size_t i = 0; i < belief.objects[0].particles.size(); ++i) {
+    const Particle& particle = belief.objects[0].particles[i];
+    if (particle.mode == MotionMode::kResting) {
+      EXPECT_EQ(particle.X_WO.translation, before.objects[0].particles[i].X_WO.translation);
+      continue;
+    }
+    ++taken;
+    EXPECT_NEAR(particle.X_WO.translation.x(), 0.15, 1e-12);
+    EXPECT_EQ(particle.V_WO.linear.x(), 0.5);
+  }
+  EXPECT_GT(taken, 2) << "the frame decides between what is taken along ...";
+  EXPECT_LT(taken, 14) << "... and what is not";
+  EXPECT_EQ(report.pushed, taken);
+}
+
+TEST_F(Predict, WhatRestsInViewStaysWhereNothingPushesIt) {
+  // Near the hand physics finds that it stays; far from it nothing is simulated; and neither where no body moves.
+  struct Case {
+    Pose X_WG;
+    double speed;
+    bool is_simulated;
+  };
+  for (const Case& c : {Case{Pose::from_translation({0.15, 0.0, 0.4}), 0.0, true},
+                        Case{Pose::from_translation({0.1, 0.0, 0.4}), 0.5, false}}) {
+    belief::Belief belief = resting_in_view();
+    const PredictReport report = run(belief, c.X_WG, 0.1, without_mode_changes(), {}, taking_along(c.speed));
+    EXPECT_EQ(report.simulated > 0, c.is_simulated);
+    for (const Particle& particle : belief.objects[0].particles) {
+      EXPECT_EQ(particle.mode, MotionMode::kResting);
+      EXPECT_EQ(particle.X_WO.translation, Vector3d(0.1, 0.0, 0.3));
+    }
+  }
+  belief::Belief belief = resting_in_view();
+  belief.robot = {Pose::from_translation({0.1, 0.0, 3.0})};
+  const PredictReport report =
+      run(belief, Pose::from_translation({0.15, 0.0, 3.0}), 0.1, without_mode_changes(), {}, taking_along(0.5));
+  EXPECT_EQ(report.simulated, 0);
+}
+
 TEST(Drift, TurnsAboutTheGivenPoint) {
   Particle particle;
   particle.X_WO.rotation = geometry::exp_rotation({0.3, -0.2, 0.5});

@@ -58,7 +58,8 @@ struct PredictOptions {
   double wake_speed = 0.15;
   /// rad/s. Its angular velocity is drawn with this standard deviation. Range 0 to 50. Chosen.
   double wake_rate = 1.0;
-  /// share. This share of a tracked object's moving particles is simulated; the others go on at constant velocity.
+  /// share. This share of a tracked object's moving particles is simulated; the others go on at constant velocity. The
+  /// same share of its resting ones is, where a robot body or an announced push may touch them; the others stay.
   /// Range 0 to 1. Chosen.
   double physics_share = 0.5;
 };
@@ -67,7 +68,7 @@ struct PredictOptions {
 struct PredictReport {
   int simulated = 0;      ///< Particles that it moved.
   int not_simulated = 0;  ///< Particles that it was to move and could not; they went on at constant velocity.
-  int pushed = 0;         ///< Particles at rest that another member of their world set in motion.
+  int pushed = 0;         ///< Particles at rest that a robot body, a push or another of their world set in motion.
   /// Why it could not move the first of these; "" = it moved all.
   std::string failure;
 };
