@@ -28,7 +28,9 @@ constexpr const char* kCameraFrame = "prescene_camera";
 constexpr std::uint8_t kMessageData = 1;
 enum class StatusLevel { kInfo = 0, kWarning = 1, kError = 2 };
 
-/// Of BeliefSummary, for those who lay out panels by it.
+/// Of BeliefSummary's JSON, for those who lay out panels by it. Viewers such as Foxglove refuse a channel whose schema
+/// gives a key several types or the type null, so what may be null (held_by, limits) has the type that it has
+/// otherwise.
 constexpr const char* kBeliefSchema = R"({"type": "object", "properties": {
   "step": {"type": "integer"}, "stamp_ns": {"type": "integer"},
   "objects": {"type": "array", "items": {"type": "object", "properties": {
@@ -46,7 +48,19 @@ constexpr const char* kBeliefSchema = R"({"type": "object", "properties": {
     "parameters": {"type": "array", "items": {"type": "object", "properties": {
       "name": {"type": "string"}, "mean": {"type": "number"}, "standard_deviation": {"type": "number"},
       "low": {"type": "number"}, "high": {"type": "number"}}}},
-    "lessons": {"type": "integer"}, "learned_ns": {"type": "integer"}}}}}})";
+    "lessons": {"type": "integer"}, "learned_ns": {"type": "integer"},
+    "alternatives": {"type": "array", "items": {"type": "object", "properties": {
+      "pose": {"type": "object", "properties": {
+        "position": {"type": "array", "items": {"type": "number"}},
+        "rotation": {"type": "object", "properties": {
+          "quaternion_wxyz": {"type": "array", "items": {"type": "number"}}}}}},
+      "probability": {"type": "number"}}}},
+    "motion": {"type": "string"}, "held_by": {"type": "string"},
+    "size": {"type": "array", "items": {"type": "number"}}}}},
+  "joints": {"type": "array", "items": {"type": "object", "properties": {
+    "joint": {"type": "string"}, "type": {"type": "string"}, "unit": {"type": "string"},
+    "position": {"type": "number"}, "standard_deviation": {"type": "number"}, "velocity": {"type": "number"},
+    "limits": {"type": "array", "items": {"type": "number"}}, "confidence": {"type": "number"}}}}}})";
 
 template <class Message>
 std::string cdr_text(const Message& message) {

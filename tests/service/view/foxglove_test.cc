@@ -4,11 +4,13 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <set>
 
 #include "prescene/interfaces/images/jpeg.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/belief_summary.h"
 #include "prescene/service/view/live_view.h"
 #include "tests/service/view/page_client.h"
 
@@ -123,6 +125,68 @@ TEST(Foxglove, AdvertisesAndPublishesWhatIsSubscribed) {
   const auto image = interfaces::decode_jpeg(picture.data);
   ASSERT_TRUE(image.ok());
   EXPECT_EQ(static_cast<std::uint32_t>((*image).width()), info_of_camera.width);
+}
+
+/// Each key of the document is in the schema, with the type that it has there or null, in the part of JSON Schema that
+/// Foxglove reads: one type a key, and keys of objects and items of lists named.
+void expect_described(const ordered_json& value, const ordered_json& schema, const std::string& path) {
+  ASSERT_TRUE(schema.is_object() && schema.contains("type") && schema["type"].is_string()) << path;
+  if (value.is_null()) return;
+  const std::string type = schema["type"].get<std::string>();
+  if (type == "object") {
+    ASSERT_TRUE(value.is_object()) << path;
+    for (const auto& [key, member] : value.items()) {
+      ASSERT_TRUE(schema.at("properties").contains(key)) << path << '.' << key << " is not in the schema";
+      expect_described(member, schema["properties"][key], path + '.' + key);
+    }
+  } else if (type == "array") {
+    ASSERT_TRUE(value.is_array()) << path;
+    EXPECT_FALSE(value.empty()) << path << ": shows nothing of its items";
+    for (const ordered_json& item : value) expect_described(item, schema.at("items"), path + "[]");
+  } else if (type == "string") {
+    EXPECT_TRUE(value.is_string()) << path;
+  } else if (type == "integer") {
+    EXPECT_TRUE(value.is_number_integer()) << path;
+  } else {
+    EXPECT_EQ(type, "number") << path;
+    EXPECT_TRUE(value.is_number()) << path;
+  }
+}
+
+/// The same the other way round: nothing is in the schema that a document of everything lacks.
+void expect_no_more(const ordered_json& schema, const ordered_json& value, const std::string& path) {
+  if (schema["type"] == "array") return expect_no_more(schema["items"], value[0], path + "[]");
+  if (schema["type"] != "object") return;
+  for (const auto& [key, member] : schema["properties"].items()) {
+    ASSERT_TRUE(value.contains(key)) << path << '.' << key << " is in the schema only";
+    expect_no_more(member, value[key], path + '.' + key);
+  }
+}
+
+TEST(Foxglove, TheSchemaOfBeliefsDescribesAllOfThem) {
+  const auto view = live_view();
+  Foxglove client(view->port());
+  client.next_text();
+  const ordered_json advertised = client.next_text();
+  ordered_json schema;
+  for (const ordered_json& channel : advertised["channels"])
+    if (channel["topic"] == "/prescene/belief") schema = ordered_json::parse(channel["schema"].get<std::string>());
+  BeliefSummary summary{3, 4, {}};
+  ObjectSummary& object = summary.objects.emplace_back();
+  object.name = "unknown_1";
+  object.parameters.push_back({"friction", 0.5, 0.1, 0.3, 0.7});
+  object.alternatives.push_back({geometry::Pose(), 0.25});
+  object.held_by = "gripper";
+  object.is_new = true;
+  summary.objects.push_back(ObjectSummary(object));
+  summary.objects.back().held_by.reset();
+  belief::JointEstimate& joint = summary.joints.emplace_back();
+  joint.joint = "slide";
+  joint.low = 0.0;
+  joint.high = std::numeric_limits<double>::infinity();  // null in JSON
+  const ordered_json document = to_json(summary);
+  expect_described(document, schema, "belief");
+  expect_no_more(schema, document, "belief");
 }
 
 TEST(Foxglove, NothingIsSentAfterUnsubscribing) {
