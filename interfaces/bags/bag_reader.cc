@@ -56,10 +56,21 @@ namespace {
 
 std::string joined(const std::string& a, const std::string& b) { return a.empty() || b.empty() ? a + b : a + "; " + b; }
 
+/// Some tools give types of ROS 2 their short names: sensor_msgs/Image for sensor_msgs/msg/Image.
+void lengthen_type_name(McapChannel& channel) {
+  std::string& name = channel.schema.name;
+  const std::size_t slash = name.find('/');
+  const bool is_short = slash != std::string::npos && slash == name.rfind('/') && slash > 0 && slash + 1 < name.size();
+  if (channel.message_encoding == "cdr" && is_short) name.insert(slash, "/msg");
+}
+
 }  // namespace
 
 void BagReader::Impl::take_channels(const std::vector<McapChannel>& of_file) {
-  for (std::size_t i = channels.size() - first_channel; i < of_file.size(); ++i) channels.push_back(of_file[i]);
+  for (std::size_t i = channels.size() - first_channel; i < of_file.size(); ++i) {
+    channels.push_back(of_file[i]);
+    lengthen_type_name(channels.back());
+  }
 }
 
 Status BagReader::Impl::open_file() {

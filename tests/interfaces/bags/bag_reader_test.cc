@@ -94,6 +94,27 @@ TEST_F(Bags, AFolderThatWasNotClosedIsReadInTheOrderOfItsNumbers) {
   EXPECT_THAT(failure_of(folder_.path()).message(), HasSubstr("different recordings"));
 }
 
+/// As tools that know types of ROS by package and name alone write them.
+TEST_F(Bags, ShortNamesOfTypesAreThoseOfRos2) {
+  const std::vector<std::pair<std::string, std::string>> names = {
+      {"sensor_msgs/Image", "sensor_msgs/msg/Image"}, {"a/msg/B", "a/msg/B"}, {"/B", "/B"}, {"a/", "a/"}, {"B", "B"}};
+  const auto writer = McapWriter::create(path("run.mcap"), {});
+  ASSERT_TRUE(writer.ok());
+  for (const auto& [given, known] : names) {
+    const auto channel = (*writer)->add_channel({"/a", "cdr", {given, "ros2msg", ""}, {}});
+    ASSERT_TRUE((*writer)->write({*channel, 0, 1, 1, {7}}).ok());
+  }
+  const auto of_ros1 = (*writer)->add_channel({"/a", "ros1", {"sensor_msgs/Image", "ros1msg", ""}, {}});
+  ASSERT_TRUE((*writer)->write({*of_ros1, 0, 1, 1, {7}}).ok());
+  ASSERT_TRUE((*writer)->close().ok());
+  const auto reader = BagReader::open(path("run.mcap"));
+  ASSERT_TRUE(reader.ok()) << reader.status().message();
+  EXPECT_EQ(read_all(**reader).size(), names.size() + 1);
+  ASSERT_EQ((*reader)->channels().size(), names.size() + 1);
+  for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ((*reader)->channels()[i].schema.name, names[i].second);
+  EXPECT_EQ((*reader)->channels().back().schema.name, "sensor_msgs/Image");
+}
+
 TEST_F(Bags, AFolderOfImagesIsNone) {
   std::filesystem::create_directory(path("frames"));
   ASSERT_TRUE(write_file(path("run.mcap"), std::string_view("x")).ok());

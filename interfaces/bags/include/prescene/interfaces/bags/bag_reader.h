@@ -49,6 +49,7 @@ class BagReader {
   /// The files that it is made of.
   const std::vector<std::filesystem::path>& files() const;
   /// Grows when the next file begins, and while a cut one is read. A .db3 has no schemas; their names are the types.
+  /// Types in CDR have their names of ROS 2: where a file says sensor_msgs/Image, it is sensor_msgs/msg/Image here.
   const std::vector<McapChannel>& channels() const;
   /// As metadata.yaml says, or the file itself; nothing where neither does.
   std::optional<std::uint64_t> message_count() const;
