@@ -56,7 +56,7 @@ class Overview {
     }
     row.last = at;
     row.bytes += message.data.size();
-    if (std::string_view(of) == "robot" && channel.message_encoding == "cdr") look_into(message, topic);
+    if (std::string_view(of) == "robot" && !other_encodings_.note(channel)) look_into(message, topic);
   }
 
   RecordingOverview finish() {
@@ -70,6 +70,7 @@ class Overview {
     for (auto& [key, transform] : transforms_) out_.transforms.push_back(std::move(transform));
     if (more_transforms_)
       problem("tf has more than " + std::to_string(kMostTransforms) + " frames; the others are left out");
+    if (const std::string others = other_encodings_.text(); !others.empty()) problem(others);
     judge_cameras();
     return std::move(out_);
   }
@@ -209,6 +210,7 @@ class Overview {
   }
 
   RecordingOverview out_;
+  OtherEncodings other_encodings_;
   std::map<std::tuple<std::string, std::string, std::string>, Topic> topics_;
   std::map<std::string, RecordedImages> images_;
   std::map<std::string, RecordedCamera> cameras_;

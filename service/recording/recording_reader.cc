@@ -165,7 +165,24 @@ std::string RecordingReader::loss_text() const {
     say("its scene, seed and settings are not there");
   if (too_long_json_ > 0) say(std::to_string(too_long_json_) + " JSON documents above the size limit were left out");
   if (damaged_json_ > 0) say(std::to_string(damaged_json_) + " messages that should hold JSON are no texts");
+  if (const std::string others = other_encodings_.text(); !others.empty()) say(others);
   return text;
+}
+
+bool OtherEncodings::note(const interfaces::McapChannel& channel) {
+  constexpr std::size_t kMostNamed = 10;
+  if (channel.message_encoding == "cdr") return false;
+  if (channels_.size() < kMostNamed)
+    channels_.insert(channel.topic + " (" + interfaces::quote(channel.message_encoding, 40) + ")");
+  ++messages_;
+  return true;
+}
+
+std::string OtherEncodings::text() const {
+  if (messages_ == 0) return "";
+  std::string names;
+  for (const std::string& name : channels_) names += (names.empty() ? "" : ", ") + name;
+  return std::to_string(messages_) + " messages that are not in CDR were left out: " + names;
 }
 
 /// The message nearest to the one expected whose number has these lower bits.
@@ -275,6 +292,7 @@ core::Result<std::optional<RecordedEntry>> RecordingReader::next() {
       mark_start(*entry);
       return entry;
     }
+    if (other_encodings_.note(channel)) continue;
     RecordedEntry entry;
     entry.message = {channel.topic, channel.schema.name, std::move(message->data), message->publish_time_ns,
                      message->log_time_ns};

@@ -11,6 +11,7 @@
 #include "prescene/core/utf8.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/recording/recording_overview.h"
 #include "prescene/service/tracking/topics.h"
 #include "tests/support/paths.h"
 
@@ -219,6 +220,39 @@ TEST(Recording, SalvageLeavesOutTruthThatWouldUnfold) {
 TEST(Recording, JsonOfOtherProgramsIsNotTakenForOurs) {
   EXPECT_FALSE(holds_own_json({kStepTopic, "json", {"step", "jsonschema", "{}"}, {}}));
   EXPECT_FALSE(holds_own_json(interfaces::ros_channel(kStepTopic, "std_msgs/msg/String")));
+}
+
+TEST(Recording, WhatIsNotInCdrIsLeftOutAndSaid) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "run.mcap";
+  {
+    const auto writer = interfaces::McapWriter::create(path, {});
+    ASSERT_TRUE(writer.ok());
+    for (const auto& [encoding, type] :
+         {std::pair("ros1", "sensor_msgs/Image"), std::pair("json", "x"), std::pair("cdr", "std_msgs/msg/String")}) {
+      const auto channel = (*writer)->add_channel({std::string("/") + encoding, encoding, {type, "x", ""}, {}});
+      ASSERT_TRUE(channel.ok());
+      for (int i = 0; i < 2; ++i)
+        ASSERT_TRUE((*writer)->write({*channel, 0, 10, 10, interfaces::encode_cdr(interfaces::RosString{"a"})}).ok());
+    }
+    ASSERT_TRUE((*writer)->close().ok());
+  }
+  const auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.ok());
+  for (int i = 0; i < 2; ++i) {
+    const auto entry = (*reader)->next();
+    ASSERT_TRUE(entry.ok() && entry->has_value());
+    EXPECT_EQ((*entry)->message.topic, "/cdr");
+    EXPECT_EQ((*entry)->index, static_cast<MessageIndex>(i));
+  }
+  const auto end = (*reader)->next();
+  ASSERT_TRUE(end.ok() && !end->has_value());
+  const std::string said = "4 messages that are not in CDR were left out: /json ('json'), /ros1 ('ros1')";
+  EXPECT_EQ((*reader)->loss_text(), said);
+  const auto overview = overview_of(path, {}, {});
+  ASSERT_TRUE(overview.ok());
+  EXPECT_EQ(overview->messages, 6u);
+  EXPECT_EQ(std::count(overview->problems.begin(), overview->problems.end(), said), 1);
 }
 
 TEST(Recording, NumbersStandBehindAGapThatSalvageLeft) {

@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -175,6 +176,19 @@ struct RecordingReadOptions {
   bool all_parts = false;  ///< Of a recording of several files, also those after this one (parts_after()).
 };
 
+/// Counts what of a recording is not in CDR, as messages of ROS 1, protobuf or JSON of other programs are.
+class OtherEncodings {
+ public:
+  /// Whether a message of this channel can't be read.
+  bool note(const interfaces::McapChannel& channel);
+  /// A sentence; empty = there are none.
+  std::string text() const;
+
+ private:
+  std::uint64_t messages_ = 0;
+  std::set<std::string> channels_;  // the first of them
+};
+
 /// Reads our recordings, and those of ROS 2 (interfaces::BagReader).
 class RecordingReader {
  public:
@@ -186,7 +200,8 @@ class RecordingReader {
   /// From the recording's metadata; defaults where it has none (a recording made by other tools).
   const RecordingInfo& info() const { return info_; }
   /// In the order of log times; empty at the end. Errors of BagReader::next; kResourceExhausted for JSON that would be
-  /// parsed and is longer than kMostParsedJsonBytes (with `salvage`, that is left out and counted).
+  /// parsed and is longer than kMostParsedJsonBytes (with `salvage`, that is left out and counted). Messages that are
+  /// not in CDR are left out and counted.
   core::Result<std::optional<RecordedEntry>> next();
   /// Whether the recording carries what its scene names. Older ones do not.
   bool has_attached_scene() const { return has_attached_scene_; }
@@ -246,6 +261,7 @@ class RecordingReader {
   bool is_numbered_ = false;         // sequences are the lower bits of the messages' numbers
   std::uint64_t too_long_json_ = 0;  // left out
   std::uint64_t damaged_json_ = 0;   // the same
+  OtherEncodings other_encodings_;   // the same
   MessageIndex next_index_ = 0;
 };
 
