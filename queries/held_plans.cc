@@ -62,8 +62,7 @@ class TiltPlan final : public OwnActionPlan {
     scene_values.push_back({"angle_deg", own.angle / geometry::kDegree, -90.0, 90.0});
     add_direction("axis_deg", own.axis_W, scene_values);
     scene_values.push_back({"duration", own.duration, kLeastFactor * own.duration, kMostFactor * own.duration});
-    add_time(scene_values);
-    return {};
+    return add_time(scene_values);
   }
   Action exact(std::span<const double> values) const override {
     Action action = timed(values);
@@ -91,8 +90,7 @@ class PourPlan final : public OwnActionPlan {
     scene_values.push_back({"angle_deg", own.angle / geometry::kDegree, 0.0, 180.0});
     add_direction("axis_deg", own.axis_W, scene_values);
     add_size("duration", own.duration, scene_values);
-    add_time(scene_values);
-    return {};
+    return add_time(scene_values);
   }
   void lead_up_to(std::span<const double> values, belief::WorldState&, std::vector<Action>& actions) const override {
     if (!chosen("height")) return;
@@ -138,12 +136,11 @@ class InsertPlan final : public OwnActionPlan {
     const Vector3d& p = X_begin_.translation;
     scene_values.push_back({"x", p.x(), p.x() - kAside, p.x() + kAside});
     scene_values.push_back({"y", p.y(), p.y() - kAside, p.y() + kAside});
-    add_size("force", belief::mean(own.force), scene_values);
-    add_size("torque", belief::mean(own.torque), scene_values);
+    PRESCENE_RETURN_IF_ERROR(add_force("force", own.force, scene_values));
+    PRESCENE_RETURN_IF_ERROR(add_force("torque", own.torque, scene_values));
     add_size("distance", own.distance, scene_values);
     add_size("duration", own.duration, scene_values);
-    add_time(scene_values);
-    return {};
+    return add_time(scene_values);
   }
   void lead_up_to(std::span<const double> values, belief::WorldState& start,
                   std::vector<Action>& actions) const override {
@@ -200,8 +197,7 @@ class TransportPlan final : public OwnActionPlan {
     for (const Action& action : scene_->actions)
       if (action.time > own_.time && belief::object_of(action) == name_) next_ = std::min(next_, action.time);
     add_size("speed", way_ / own.duration, scene_values);
-    add_time(scene_values);
-    return {};
+    return add_time(scene_values);
   }
   std::optional<std::string> obstacle(std::span<const double> values) override {
     const Action action = exact(values);

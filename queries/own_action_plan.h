@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "own_action.h"
@@ -83,14 +84,18 @@ class OwnActionPlan : public PlannedAction {
     return action;
   }
 
-  void add_time(std::vector<SceneValue>& scene_values) const {
-    scene_values.push_back({"time", own_.time, 0.0, own_.time + 1.0});
-  }
+  /// `time`: the action keeps its place among what the scene does with the object. Fails where the question has it
+  /// elsewhere: nothing would hold the object yet, say, or its hand would be on its way.
+  core::Status add_time(std::vector<SceneValue>& scene_values) const;
   // Ranges about what the scene does: forces, speeds and lengths by these factors.
   static constexpr double kLeastFactor = 0.25, kMostFactor = 4.0;
   static void add_size(const char* name, double own, std::vector<SceneValue>& scene_values) {
     scene_values.push_back({name, own, kLeastFactor * own, kMostFactor * own});
   }
+  /// The same, within the ends of the scene's normal distribution: beyond them another force would be drawn than was
+  /// chosen. Fails where the question has one there.
+  core::Status add_force(const char* name, const belief::ScalarDistribution& own,
+                         std::vector<SceneValue>& scene_values);
   static void add_direction(const char* name, const geometry::Vector3d& own, std::vector<SceneValue>& scene_values) {
     scene_values.push_back({name, std::atan2(own.y(), own.x()) / geometry::kDegree, -180.0, 180.0});
   }
@@ -104,6 +109,13 @@ class OwnActionPlan : public PlannedAction {
     }
     return last;
   }
+  /// From when until when the action may begin, s, and what the scene does at these ends; nothing: there is no end.
+  struct Slot {
+    double from = 0.0, until = std::numeric_limits<double>::infinity();
+    const belief::Action* before = nullptr;
+    const belief::Action* after = nullptr;
+  };
+  Slot slot() const;
   /// Where the object is, if nothing is uncertain, when its own action begins: where that carry has brought it, or its
   /// hand.
   belief::Pose begin_pose() const {

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "own_action_plan.h"
+#include "prescene/belief/robot_motion.h"
+#include "prescene/core/text.h"
 
 namespace prescene::queries {
 namespace {
@@ -14,6 +16,8 @@ using geometry::Vector3d;
 
 // What is done where the scene does no such thing.
 constexpr double kOwnTurn = 45.0 * geometry::kDegree, kOwnWay = 0.1;
+// By how much a number of a question may be beyond an end; as of the schema's bounds.
+constexpr double kEndTolerance = 1e-9;
 
 std::string moved_object(const belief::Scene& scene, const Action& action) {
   const auto* move = std::get_if<belief::MoveJoint>(&action.what);
@@ -27,10 +31,9 @@ class GraspPlan final : public OwnActionPlan {
   using OwnActionPlan::OwnActionPlan;
   core::Status prepare(std::vector<SceneValue>& scene_values) override {
     const belief::Grip grip = std::get<belief::Grasp>(own_.what).grip.value_or(belief::Grip{});
-    add_size("grip_force", belief::mean(grip.force), scene_values);
+    PRESCENE_RETURN_IF_ERROR(add_force("grip_force", grip.force, scene_values));
     add_size("pad_length", grip.pad_length, scene_values);
-    add_time(scene_values);
-    return {};
+    return add_time(scene_values);
   }
   Action exact(std::span<const double> values) const override {
     Action action = timed(values);
@@ -49,12 +52,11 @@ class PullPlan final : public OwnActionPlan {
   using OwnActionPlan::OwnActionPlan;
   core::Status prepare(std::vector<SceneValue>& scene_values) override {
     const auto& own = std::get<belief::Pull>(own_.what);
-    add_size("force", belief::mean(own.force), scene_values);
+    PRESCENE_RETURN_IF_ERROR(add_force("force", own.force, scene_values));
     add_size("distance", own.by.norm(), scene_values);
     add_direction("direction_deg", own.by, scene_values);
     add_size("duration", own.duration, scene_values);
-    add_time(scene_values);
-    return {};
+    return add_time(scene_values);
   }
   Action exact(std::span<const double> values) const override {
     Action action = timed(values);
@@ -91,10 +93,9 @@ class MoveJointPlan final : public OwnActionPlan {
     const double low = std::isfinite(joint_->low) ? joint_->low / unit : -reach;
     const double high = std::isfinite(joint_->high) ? joint_->high / unit : std::max(reach, low);
     scene_values.push_back({slides ? "to" : "to_deg", own.to / unit, std::min(low, high), high});
-    add_size("force", belief::mean(own.force), scene_values);
+    PRESCENE_RETURN_IF_ERROR(add_force("force", own.force, scene_values));
     add_size("duration", own.duration, scene_values);
-    add_time(scene_values);
-    return {};
+    return add_time(scene_values);
   }
   std::optional<std::string> obstacle(std::span<const double> values) override {
     const double to = std::get<belief::MoveJoint>(exact(values).what).to;
@@ -117,7 +118,100 @@ class MoveJointPlan final : public OwnActionPlan {
   const belief::Joint* joint_ = nullptr;
 };
 
+/// A number of the question, and where it is there.
+struct AskedNumber {
+  std::string place;
+  double value = 0.0;
+};
+std::vector<AskedNumber> numbers_asked(const belief::AchieveQuery& query, const std::string& name) {
+  std::vector<AskedNumber> asked;
+  for (const belief::ParameterRange& range : query.free) {
+    if (range.name != name) continue;
+    for (const std::optional<double>& end : {range.low, range.high})
+      if (end) asked.push_back({"free." + name, *end});
+  }
+  for (const belief::ParameterValue& fixed : query.fixed)
+    if (fixed.name == name) asked.push_back({"fixed." + name, fixed.value});
+  return asked;
+}
+
 }  // namespace
+
+core::Status OwnActionPlan::add_force(const char* name, const belief::ScalarDistribution& own,
+                                      std::vector<SceneValue>& scene_values) {
+  const double mean = belief::mean(own);
+  SceneValue value{name, mean, kLeastFactor * mean, kMostFactor * mean};
+  if (const auto* normal = std::get_if<belief::NormalScalar>(&own)) {
+    const std::string whose = "the scene's own " + belief::kind_of(own_) + " cuts its normal distribution there";
+    for (const AskedNumber& asked : numbers_asked(query_, name)) {
+      if (asked.value > normal->high + kEndTolerance)
+        return core::invalid_input(core::rounded_text(asked.value) + " is out of range: " + whose +
+                                   ", so that less would be drawn: give at most " + core::rounded_text(normal->high) +
+                                   ", or raise its 'max' in the scene")
+            .at(asked.place);
+      if (asked.value < normal->low - kEndTolerance)
+        return core::invalid_input(core::rounded_text(asked.value) + " is out of range: " + whose +
+                                   ", so that more would be drawn: give at least " + core::rounded_text(normal->low) +
+                                   ", or lower its 'min' in the scene")
+            .at(asked.place);
+    }
+    const auto searched = [&](const std::optional<double> belief::ParameterRange::*end) {
+      return std::ranges::any_of(query_.free,
+                                 [&](const auto& range) { return range.name == name && !(range.*end).has_value(); });
+    };
+    const auto remark = [&](const char* to, double end) {
+      remarks_.push_back("'" + std::string(name) + "' is searched no " + to + " than " + core::rounded_text(end) +
+                         ": " + whose + ".");
+    };
+    if (value.low < normal->low && searched(&belief::ParameterRange::low)) remark("lower", normal->low);
+    if (value.high > normal->high && searched(&belief::ParameterRange::high)) remark("higher", normal->high);
+    value.low = std::max(value.low, normal->low);
+    value.high = std::min(value.high, normal->high);
+  }
+  scene_values.push_back(std::move(value));
+  return {};
+}
+
+OwnActionPlan::Slot OwnActionPlan::slot() const {
+  Slot slot;
+  for (std::size_t i = 0; i < scene_->actions.size(); ++i) {
+    const Action& other = scene_->actions[i];
+    // What happens to the object is not what a hand does with it.
+    if (i == at_ || std::holds_alternative<belief::Bump>(other.what) || moved_object(*scene_, other) != name_) continue;
+    if (at_ && i < *at_) {
+      const double over = other.time + belief::duration_of(other);
+      if (over <= slot.from) continue;
+      slot.from = over;
+      slot.before = &other;
+    } else if ((at_ || belief::lets_go(other)) && other.time < slot.until) {
+      slot.until = other.time;
+      slot.after = &other;
+    }
+  }
+  // The scene may begin it while the one before is not over.
+  slot.from = std::min(slot.from, own_.time);
+  slot.until = std::max(slot.until, own_.time);
+  return slot;
+}
+
+core::Status OwnActionPlan::add_time(std::vector<SceneValue>& scene_values) const {
+  const Slot slot = this->slot();
+  const auto named = [&](const Action& action) {
+    return "the scene's " + belief::kind_of(action) + " of '" + name_ + "'";
+  };
+  for (const AskedNumber& asked : numbers_asked(query_, "time")) {
+    if (slot.before != nullptr && asked.value < slot.from - kEndTolerance)
+      return core::invalid_input(core::rounded_text(asked.value) + " is out of range: " + named(*slot.before) +
+                                 " comes before: give " + core::rounded_text(slot.from) + " s or later")
+          .at(asked.place);
+    if (slot.after != nullptr && asked.value > slot.until + kEndTolerance)
+      return core::invalid_input(core::rounded_text(asked.value) + " is out of range: " + named(*slot.after) +
+                                 " comes after: give " + core::rounded_text(slot.until) + " s or earlier")
+          .at(asked.place);
+  }
+  scene_values.push_back({"time", own_.time, slot.from, std::min(own_.time + 1.0, slot.until)});
+  return {};
+}
 
 std::optional<std::size_t> own_action(const belief::Scene& scene, const std::string& kind, const std::string& object) {
   std::optional<std::size_t> last;

@@ -371,6 +371,71 @@ TEST(OwnActions, WhatTheSceneLacksIsRefusedWithTheRemedy) {
   }
 }
 
+TEST(OwnActions, AForceIsNeverChosenWhereTheSceneCutsIt) {
+  for (Case one : cases()) {
+    if (one.kind != "pull") continue;
+    std::get<belief::Pull>(one.own.what).force = belief::NormalScalar{10.0, 2.0, 8.0, 15.0};
+    AchieveQuery query = question(one);
+    query.free = {{"force", {}, {}}};
+    const Answer answer = ask(one, query);
+    ASSERT_TRUE(answer.error.ok()) << answer.error.message();
+    const auto& told = std::get<AchieveAnswer>(answer.what);
+    EXPECT_EQ(told.parameters[0].low, 8.0);
+    EXPECT_EQ(told.parameters[0].high, 15.0);
+    EXPECT_THAT(told.remarks, testing::IsSupersetOf({HasSubstr("'force' is searched no lower than 8: "),
+                                                     HasSubstr("'force' is searched no higher than 15: ")}));
+    ASSERT_TRUE(told.best.action);
+    const auto& force = std::get<belief::NormalScalar>(std::get<belief::Pull>(told.best.action->what).force);
+    EXPECT_EQ(force, (belief::NormalScalar{told.best.values[0], 2.0, 8.0, 15.0}));
+    query.free = {{"force", 9.0, 15.0}};
+    EXPECT_TRUE(ask(one, query).error.ok());
+    query.free = {{"force", 9.0, 16.0}};
+    EXPECT_THAT(ask(one, query).error.message(), HasSubstr("free.force: 16 is out of range: "));
+    query.free = {{"force", 7.0, {}}};
+    EXPECT_THAT(ask(one, query).error.message(), HasSubstr("give at least 8"));
+    query.free = {{"direction", -90.0, 90.0}};
+    query.fixed = {{"force", 40.0}};
+    EXPECT_THAT(ask(one, query).error.message(), HasSubstr("fixed.force: 40 is out of range: "));
+  }
+}
+
+TEST(OwnActions, TheTimeKeepsTheOrderOfWhatTheSceneDoes) {
+  for (const Case& one : cases()) {
+    if (one.kind != "tilt") continue;
+    // It is carried from 0.3 to 0.8 s, and let go at 1.5 s.
+    const auto asked = [&](const AchieveQuery& query, bool in_scene) {
+      auto scene = scene_of(one);
+      scene->actions = {{0.3, carry_to({0.0, 0.0, 0.6})}};
+      if (in_scene) scene->actions.push_back({1.0, one.own.what});
+      scene->actions.push_back({1.5, belief::Release{"carton"}});
+      core::ThreadPool pool(2);
+      return queries::answer(scene, 1, {"q", query}, tests::context_with(law_of(one), pool));
+    };
+    AchieveQuery query = question(one);
+    query.free = {{"time", {}, {}}};
+    const auto range = [&](bool in_scene) {
+      const Answer answer = asked(query, in_scene);
+      EXPECT_TRUE(answer.error.ok()) << answer.error.message();
+      if (!answer.error.ok()) return std::pair(0.0, 0.0);
+      const belief::SearchedParameter& time = std::get<AchieveAnswer>(answer.what).parameters.at(0);
+      return std::pair(time.low, time.high);
+    };
+    EXPECT_EQ(range(true), std::pair(0.8, 1.5));
+    EXPECT_EQ(range(false), std::pair(0.0, 1.0)) << "one that is added may come before";
+    const auto error = [&](double low, double high, bool in_scene) {
+      query.free = {{"time", low, high}};
+      return asked(query, in_scene).error.message();
+    };
+    EXPECT_THAT(error(0.0, 1.2, true), HasSubstr("free.time: 0 is out of range: the scene's transport of 'carton'"));
+    EXPECT_THAT(error(0.9, 1.6, true), HasSubstr("free.time: 1.6 is out of range: the scene's release of 'carton'"));
+    EXPECT_EQ(error(0.8, 1.5, true), "");
+    EXPECT_THAT(error(0.0, 1.6, false), HasSubstr("release of 'carton' comes after: give 1.5 s or earlier"));
+    query.free = {{"angle", 0.0, 90.0}};
+    query.fixed = {{"time", 0.5}};
+    EXPECT_THAT(asked(query, true).error.message(), HasSubstr("fixed.time: 0.5 is out of range: "));
+  }
+}
+
 TEST(OwnActions, WhatIsTooSlowForTheNextActionIsNoChoice) {
   Case one = cases().back();
   ASSERT_EQ(one.kind, "transport");
