@@ -16,10 +16,6 @@ using geometry::Pose;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-bool all_finite(std::span<const double> q) {
-  return std::all_of(q.begin(), q.end(), [](double value) { return std::isfinite(value); });
-}
-
 core::Status check_options(const MotionCheckOptions& options) {
   if (!(options.margin >= 0.0 && options.margin <= 1.0))
     return core::invalid_input("margin: " + core::rounded_text(options.margin) +
@@ -39,8 +35,9 @@ core::Result<std::shared_ptr<const MotionChecker>> MotionChecker::make(std::shar
                                                                        std::span<const double> home) {
   PRESCENE_RETURN_IF_ERROR(check_options(options));
   if (mover == nullptr) return core::invalid_input("no mover: say what is planned for");
-  if (!home.empty() && (home.size() != mover->dimension() || !all_finite(home)))
-    return core::invalid_input("home: give " + std::to_string(mover->dimension()) + " finite numbers");
+  if (!home.empty() && (home.size() != mover->dimension() || !mover->is_configuration(home)))
+    return core::invalid_input("home: give " + std::to_string(mover->dimension()) +
+                               " finite numbers, and a quaternion that is not zero where there is one");
   std::shared_ptr<MotionChecker> checker(new MotionChecker());
   for (const Obstacle& obstacle : obstacles) {
     const auto X_WO = collision::to_transform(obstacle.X_WO);
@@ -95,7 +92,7 @@ bool MotionChecker::meets(const Pair& pair, PlanningScratch& scratch) const {
 }
 
 bool MotionChecker::is_free(std::span<const double> q, PlanningScratch& scratch) const {
-  if (!all_finite(q)) return false;
+  if (!mover_->is_configuration(q)) return false;
   place(q, scratch);
   return std::none_of(pairs_.begin(), pairs_.end(), [&](const Pair& pair) { return meets(pair, scratch); });
 }
@@ -109,7 +106,7 @@ double MotionChecker::clearance(std::span<const double> q, PlanningScratch& scra
 
 MotionCheck MotionChecker::check(std::span<const double> q0, std::span<const double> q1, PlanningScratch& scratch,
                                  Order order) const {
-  if (!all_finite(q0) || !all_finite(q1)) return {MotionCheck::kBlocked, 0.0, 0};
+  if (!mover_->is_configuration(q0) || !mover_->is_configuration(q1)) return {MotionCheck::kBlocked, 0.0, 0};
   if (options_.margin == 0.0 && only_triangles_ && mover_->shapes().size() == 1) {
     if (const auto twist = mover_->steady_twist(q0, q1)) return first_contacts(q0, q1, *twist, scratch, order);
   }

@@ -29,6 +29,15 @@ Vector3d shorter_turn(std::span<const double> q0, std::span<const double> q1) {
 
 }  // namespace
 
+bool Mover::is_configuration(std::span<const double> q) const {
+  return std::all_of(q.begin(), q.end(), [](double value) { return std::isfinite(value); });
+}
+
+bool RigidBody::is_configuration(std::span<const double> q) const {
+  // Neither zero nor infinite, also where squares of tiny or huge numbers are: what is normalised has the length 1.
+  return Mover::is_configuration(q) && std::isnormal(turn_of(q).squaredNorm());
+}
+
 RigidBody::RigidBody(std::string name, PlanningShape shape) { shapes_.push_back({std::move(name), std::move(shape)}); }
 
 Pose RigidBody::pose(std::span<const double> q) { return {turn_of(q).normalized(), Vector3d(q[0], q[1], q[2])}; }

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <utility>
 
 #include "prescene/collision/spheres/sphere_packing.h"
@@ -232,6 +233,34 @@ TEST(MotionCheckerLaws, RefusesWhatIsWrongAndNamesIt) {
   q[1] = std::nan("");
   EXPECT_FALSE(checker->is_free(q, scratch));
   EXPECT_EQ(checker->check(q, q, scratch).outcome, MotionCheck::kBlocked);
+}
+
+TEST(MotionCheckerLaws, AQuaternionMayHaveAnyLengthButZero) {
+  // A plate that the body meets in one attitude of two, 1 cm from its origin.
+  const auto checker = checker_of(
+      box_shape(0.1, 0.1, 0.01), {{"plate", box_shape(1.0, 1.0, 0.002), Pose::from_translation({0.0, 0.0, 0.01})}}, {});
+  const Vector3d quarter(0.5 * std::numbers::pi, 0.0, 0.0);
+  PlanningScratch scratch;
+  const auto scaled = [](const Vector3d& turn, double length) {
+    Configuration q = RigidBody::configuration({geometry::exp_rotation(turn), Vector3d::Zero()});
+    for (std::size_t i = 3; i < q.size(); ++i) q[i] *= length;
+    return q;
+  };
+  for (const double length : {1.0, 1e-3, 7.0, 1e100}) {
+    EXPECT_TRUE(checker->is_free(scaled(Vector3d::Zero(), length), scratch)) << length;
+    EXPECT_FALSE(checker->is_free(scaled(quarter, length), scratch)) << length;
+  }
+  const Configuration sound = scaled(Vector3d::Zero(), 1.0);
+  for (const double length : {0.0, 1e-200, 1e300}) {
+    const Configuration bad = scaled(Vector3d::Zero(), length);
+    EXPECT_FALSE(checker->is_free(bad, scratch)) << length;
+    EXPECT_EQ(checker->clearance(bad, scratch), 0.0) << length;
+    EXPECT_EQ(checker->check(sound, bad, scratch).outcome, MotionCheck::kBlocked) << length;
+    EXPECT_EQ(checker->check(bad, sound, scratch).outcome, MotionCheck::kBlocked) << length;
+    const auto home =
+        MotionChecker::make(std::make_shared<const RigidBody>("body", box_shape(0.1, 0.1, 0.1)), {}, {}, bad);
+    EXPECT_THAT(home.status().message(), HasSubstr("home: give 7 finite numbers"));
+  }
 }
 
 }  // namespace

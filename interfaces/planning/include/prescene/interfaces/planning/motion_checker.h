@@ -83,7 +83,7 @@ class MotionChecker {
                                                                  const MotionCheckOptions& options,
                                                                  std::span<const double> home = {});
 
-  /// False for numbers that are not finite.
+  /// False for numbers that are no configuration (Mover::is_configuration).
   bool is_free(std::span<const double> q, PlanningScratch& scratch) const;
   /// How far the nearest two are apart, less the margin, m: a lower bound, as shape_gap. Zero where is_free is false.
   double clearance(std::span<const double> q, PlanningScratch& scratch) const;

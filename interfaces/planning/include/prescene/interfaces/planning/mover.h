@@ -36,6 +36,8 @@ class Mover {
   const std::vector<MovingShape>& shapes() const { return shapes_; }
   /// How many numbers a configuration has. Of those that functions are given, this many are there (not checked).
   virtual std::size_t dimension() const = 0;
+  /// Whether these numbers say where the shapes are: all are finite. The other functions take none that do not.
+  virtual bool is_configuration(std::span<const double> q) const;
   /// Poses in the world of all shapes. `work` is memory that is kept from call to call.
   virtual void place(std::span<const double> q, std::span<geometry::Pose> X_WS,
                      std::vector<geometry::Pose>* work) const = 0;
@@ -67,6 +69,8 @@ class RigidBody final : public Mover {
   RigidBody(std::string name, PlanningShape shape);
 
   std::size_t dimension() const override { return 7; }
+  /// The quaternion may have any length but zero.
+  bool is_configuration(std::span<const double> q) const override;
   void place(std::span<const double> q, std::span<geometry::Pose> X_WS,
              std::vector<geometry::Pose>* work) const override;
   void between(std::span<const double> q0, std::span<const double> q1, double t, std::span<double> q) const override;
