@@ -194,13 +194,20 @@ MotionCheck MotionChecker::cut_pieces(std::span<const double> q0, std::span<cons
   const double margin = options_.margin;
   auto& pieces = scratch.pieces_;
   auto& bounds = scratch.bounds_;
+  auto& left = scratch.left_;
   auto& right = scratch.right_;
+  const auto put_down = [&](double begin, double end, const std::vector<PlanningScratch::Bound>& of) {
+    if (of.empty()) return;
+    pieces.push_back({begin, end, bounds.size(), of.size()});
+    bounds.insert(bounds.end(), of.begin(), of.end());
+  };
   scratch.configuration_.resize(mover_->dimension());
   for (std::size_t next = 0; next < pieces.size();) {
     // From the start on: the last that was put down. Else the longest: the first.
     const PlanningScratch::Piece piece = order == Order::kEarliest ? pieces.back() : pieces[next];
     if (order == Order::kEarliest) {
       pieces.pop_back();
+      bounds.resize(piece.first + piece.count);  // What was put down after it is done.
     } else {
       ++next;
     }
@@ -212,8 +219,8 @@ MotionCheck MotionChecker::cut_pieces(std::span<const double> q0, std::span<cons
     mover_->between(q0, q1, middle, scratch.configuration_);
     place(scratch.configuration_, scratch);
     ++result.steps;
+    left.clear();
     right.clear();
-    const std::size_t first = bounds.size();
     bool is_blocked = false, is_short = false;
     for (std::size_t i = piece.first; i < piece.first + piece.count; ++i) {
       const PlanningScratch::Bound bound = bounds[i];
@@ -222,19 +229,16 @@ MotionCheck MotionChecker::cut_pieces(std::span<const double> q0, std::span<cons
       if (there == kInfinity) continue;
       const bool left_open = !(way < bound.at_begin + there - 2.0 * margin);
       const bool right_open = !(way < there + bound.at_end - 2.0 * margin);
-      if (left_open) bounds.push_back({bound.pair, bound.at_begin, there});
+      if (left_open) left.push_back({bound.pair, bound.at_begin, there});
       if (right_open) right.push_back({bound.pair, there, bound.at_end});
       is_blocked = is_blocked || there <= margin;
       is_short = is_short || ((left_open || right_open) && way <= options_.tolerance);
     }
     // What is short enough and not known to be free passes within the tolerance.
     if (is_short || (is_blocked && order == Order::kAny)) return ended(MotionCheck::kBlocked);
-    const std::size_t lefts = bounds.size() - first;
-    bounds.insert(bounds.end(), right.begin(), right.end());
-    const PlanningScratch::Piece late{middle, piece.end, first + lefts, right.size()};
-    if (order == Order::kEarliest && late.count > 0) pieces.push_back(late);
-    if (lefts > 0) pieces.push_back({piece.begin, middle, first, lefts});
-    if (order == Order::kAny && late.count > 0) pieces.push_back(late);
+    if (order == Order::kEarliest) put_down(middle, piece.end, right);
+    put_down(piece.begin, middle, left);
+    if (order == Order::kAny) put_down(middle, piece.end, right);
   }
   return result;
 }

@@ -70,7 +70,7 @@ class PlanningScratch {
   };
   std::vector<geometry::Pose> poses_, work_;
   std::vector<double> configuration_, ways_;
-  std::vector<Bound> bounds_, right_;
+  std::vector<Bound> bounds_, left_, right_;
   std::vector<Piece> pieces_;
 };
 
