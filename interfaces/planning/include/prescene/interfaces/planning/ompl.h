@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -103,6 +104,7 @@ class OmplCollisions {
         memory_ = std::move(owner_.free_.back());
         owner_.free_.pop_back();
       } else {
+        owner_.free_.reserve(++owner_.made_);  // To give one back never allocates, and so does not throw.
         memory_ = std::make_unique<Memory>();
         memory_->first.resize(owner_.checker_->mover().dimension());
         memory_->second.resize(owner_.checker_->mover().dimension());
@@ -141,6 +143,7 @@ class OmplCollisions {
   Counts counts_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<Memory>> free_;
+  std::size_t made_ = 0;  // At least as many as there are memories.
 };
 
 /// A state is valid when it is within the space's bounds and free of collisions.
