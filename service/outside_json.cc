@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/outside_json.h"
 
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "prescene/belief/json.h"
@@ -16,6 +18,11 @@ constexpr std::size_t kLongestIdKept = 4096;
 nlohmann::ordered_json parse_or_discard(std::string_view text, std::size_t most_bytes) {
   auto document = belief::parse_json(text, most_bytes);
   return document ? *std::move(document) : nlohmann::ordered_json(nlohmann::ordered_json::value_t::discarded);
+}
+
+bool is_stamp(const nlohmann::ordered_json& value) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max() / 2;
+  return value.is_number_unsigned() && value.get<std::uint64_t>() <= kMost;
 }
 
 std::string id_of(std::string_view text) { return id_of_document(parse_or_discard(text)); }

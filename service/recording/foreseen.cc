@@ -149,10 +149,7 @@ ordered_json to_json(const OutcomeRecord& record) {
 core::Result<OutcomeRecord> outcome_record_from_json(const std::string& text) {
   const core::Status bad = core::data_loss("the record of outcomes of the recording is damaged");
   const ordered_json json = parse_or_discard(text, kMostParsedJsonBytes);
-  const auto is_time = [](const ordered_json& value) {
-    return value.is_number_unsigned() && value.get<std::uint64_t>() <= std::uint64_t{INT64_MAX} / 2;
-  };
-  if (!json.is_object() || !json.contains("end_ns") || !is_time(json["end_ns"]) || !json.contains("outcomes") ||
+  if (!json.is_object() || !json.contains("end_ns") || !is_stamp(json["end_ns"]) || !json.contains("outcomes") ||
       !json["outcomes"].is_array())
     return bad;
   OutcomeRecord record;
@@ -164,7 +161,7 @@ core::Result<OutcomeRecord> outcome_record_from_json(const std::string& text) {
     if (!is("name", &ordered_json::is_string) || !is("group", &ordered_json::is_string)) return bad;
     CameOutcome outcome{item["name"].get<std::string>(), item["group"].get<std::string>(), std::nullopt, 0};
     if (is("came", &ordered_json::is_boolean)) outcome.came = item["came"].get<bool>();
-    if (is("since_ns", &ordered_json::is_number_unsigned) && is_time(item["since_ns"]))
+    if (is("since_ns", &ordered_json::is_number_unsigned) && is_stamp(item["since_ns"]))
       outcome.since_ns = item["since_ns"].get<core::TimeNs>();
     record.outcomes.push_back(std::move(outcome));
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <variant>
@@ -136,6 +137,15 @@ void add_actions(const belief::Scene& scene, std::span<const PlayedPart> parts, 
   }
 }
 
+/// Whether what happened to the object at this time is there already under this name.
+bool is_told(const std::vector<HappenedEvent>& events, const std::string& object, double time,
+             const std::string& name) {
+  return std::any_of(events.begin(), events.end(), [&](const HappenedEvent& event) {
+    return event.object == object && event.event == name && std::abs(event.time - time) <= kStepsOff;
+  });
+}
+
+/// Changes of one frame are one event: a blow to what is moved, taken or put in then is part of that.
 void add_changes(std::span<const UnannouncedChange> changes, const std::string& object,
                  const std::vector<PlaceInTime>& places, std::vector<HappenedEvent>& events) {
   std::vector<UnannouncedChange> own;
@@ -147,6 +157,10 @@ void add_changes(std::span<const UnannouncedChange> changes, const std::string& 
     const UnannouncedChange& change = own[i];
     std::optional<EventKind> kind;
     if (change.added_velocity) {
+      const auto displaces = [&](const UnannouncedChange& other) {
+        return !other.added_velocity && other.time == change.time && change.time > 0.0;
+      };
+      if (std::any_of(own.begin(), own.end(), displaces)) continue;
       const auto next = std::find_if(places.begin(), places.end(),
                                      [&](const PlaceInTime& place) { return place.time > change.time - kStepsOff; });
       const bool was_held = next != places.end() && next != places.begin() && std::prev(next)->is_held;
@@ -159,11 +173,14 @@ void add_changes(std::span<const UnannouncedChange> changes, const std::string& 
     } else if (is_there) {
       is_there = false;
       if (change.time > 0.0) {
-        kind = i + 1 < own.size() ? EventKind::kMoved : EventKind::kTakenAway;
+        const bool is_put_down = std::any_of(own.begin() + static_cast<std::ptrdiff_t>(i) + 1, own.end(),
+                                             [](const auto& later) { return !later.added_velocity && later.X_WO; });
+        kind = is_put_down ? EventKind::kMoved : EventKind::kTakenAway;
         was_there = true;
       }
     }
-    if (kind) events.push_back({change.time, belief::name_of(*kind), object, "", false});
+    if (kind && !is_told(events, object, change.time, belief::name_of(*kind)))
+      events.push_back({change.time, belief::name_of(*kind), object, "", false});
   }
 }
 
@@ -227,8 +244,9 @@ core::Result<HappenedRecord> happened_from_json(const std::string& text) {
   const auto number_of = [&](const ordered_json& in, const char* key) {
     return has(in, key, &ordered_json::is_number) ? std::optional<double>(in[key].get<double>()) : std::nullopt;
   };
-  if (!has(json, "first_ns", &ordered_json::is_number_integer) || !has(json, "events", &ordered_json::is_array) ||
-      !has(json, "objects", &ordered_json::is_array) || !has(json, "joints", &ordered_json::is_array))
+  if (!json.is_object() || !json.contains("first_ns") || !is_stamp(json["first_ns"]) ||
+      !has(json, "events", &ordered_json::is_array) || !has(json, "objects", &ordered_json::is_array) ||
+      !has(json, "joints", &ordered_json::is_array))
     return bad;
   HappenedRecord record;
   record.first_ns = json["first_ns"].get<core::TimeNs>();

@@ -315,8 +315,8 @@ ordered_json to_json(const TruthRecord& record) {
 core::Result<TruthRecord> truth_from_json(const std::string& text) {
   const core::Status bad = core::data_loss("a truth record of the recording is damaged");
   const ordered_json json = parse_or_discard(text, kMostParsedJsonBytes);
-  if (!json.is_object() || !json.contains("stamp_ns") || !json["stamp_ns"].is_number_integer() ||
-      !json.contains("objects") || !json["objects"].is_array())
+  if (!json.is_object() || !json.contains("stamp_ns") || !is_stamp(json["stamp_ns"]) || !json.contains("objects") ||
+      !json["objects"].is_array())
     return bad;
   TruthRecord record;
   record.stamp_ns = json["stamp_ns"].get<core::TimeNs>();

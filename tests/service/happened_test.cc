@@ -100,6 +100,26 @@ TEST_F(HappenedTest, ChangesAreEventsOfTheirKinds) {
   EXPECT_EQ(of(moved, "apart")->event, "moved");
   EXPECT_DOUBLE_EQ(of(moved, "apart")->time, 0.3);
   EXPECT_FALSE(happened({{0.5, "apart", {}, {}}}, true).objects[2].X_WO);
+  // What is taken and not put down was taken away, also where something is said of it later.
+  EXPECT_EQ(of(happened({{0.3, "apart", {}, {}}, {0.5, "apart", {}, blow}}, true), "apart")->event, "taken_away");
+}
+
+TEST_F(HappenedTest, WhatHappensAtOnceHasOneLabel) {
+  const auto labels = [](const HappenedRecord& record, const std::string& object) {
+    std::vector<std::string> all;
+    for (const HappenedEvent& event : record.events)
+      if (event.object == object) all.push_back(event.event);
+    return all;
+  };
+  geometry::Twist blow;
+  blow.linear = {0.0, 0.3, 0.0};
+  const geometry::Pose there = geometry::Pose::from_translation({0.3, 0.3, 0.025});
+  const UnannouncedChange put{0.5, "apart", there, {}}, hit{0.5, "apart", {}, blow};
+  EXPECT_EQ(labels(happened({put, hit}, true), "apart"), std::vector<std::string>{"moved"});
+  EXPECT_EQ(labels(happened({hit, put}, true), "apart"), std::vector<std::string>{"moved"});
+  EXPECT_EQ(labels(happened({{0.5, "apart", {}, {}}, put}, true), "apart"), std::vector<std::string>{"moved"});
+  // The hand that nobody announces opens by itself, and at that moment by a change, too.
+  EXPECT_EQ(labels(happened({{0.4, "held", {}, blow}}, false), "held"), std::vector<std::string>{"slipped"});
 }
 
 TEST_F(HappenedTest, IsReadAsItWasWritten) {
@@ -113,6 +133,9 @@ TEST_F(HappenedTest, IsReadAsItWasWritten) {
   ASSERT_TRUE(read.ok()) << read.status().message();
   EXPECT_EQ(*read, record);
   for (const char* text : {"", "[]", "{}", R"({"first_ns": 1, "events": [1], "objects": [], "joints": []})",
+                           R"({"first_ns": 18446744073709551615, "events": [], "objects": [], "joints": []})",
+                           R"({"first_ns": 9223372036854775807, "events": [], "objects": [], "joints": []})",
+                           R"({"first_ns": -1, "events": [], "objects": [], "joints": []})",
                            R"({"first_ns": 1, "events": [], "objects": [{"name": "a"}], "joints": []})"})
     EXPECT_EQ(happened_from_json(text).status().code(), core::StatusCode::kDataLoss) << text;
 }

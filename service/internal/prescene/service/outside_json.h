@@ -15,6 +15,8 @@ inline constexpr std::size_t kMostJsonBytes = std::size_t{256} << 20;
 /// The document; discarded (is_discarded()) where it is no JSON, longer than `most_bytes` or nested too deep to be
 /// copied.
 nlohmann::ordered_json parse_or_discard(std::string_view text, std::size_t most_bytes = kMostJsonBytes);
+/// A time in ns since 1970. Below half of what core::TimeNs holds, so that neither it nor a sum of two wraps.
+bool is_stamp(const nlohmann::ordered_json& value);
 /// The "id" of a question or an answer; empty where there is none, or a very long one.
 std::string id_of_document(const nlohmann::ordered_json& document);
 std::string id_of(std::string_view text);
