@@ -199,7 +199,8 @@ core::Result<UnannouncedChange> put_from_text(const std::string& text) {
 
 core::Result<std::vector<PlayedPart>> play_scene(const Scene& scene, std::vector<UnannouncedChange> changes,
                                                  const simulation::SimulatorFactory& simulators, double interval,
-                                                 std::uint64_t seed, core::ThreadPool& pool) {
+                                                 std::uint64_t seed, core::ThreadPool& pool,
+                                                 const core::Cancellation* cancellation) {
   for (UnannouncedChange& change : changes) {
     PRESCENE_RETURN_IF_ERROR(check(scene, change));
     change.time = frame_of_change(scene, change.time, interval);
@@ -237,7 +238,9 @@ core::Result<std::vector<PlayedPart>> play_scene(const Scene& scene, std::vector
     std::vector<WorldState>& states = part.trajectory.states;
     if (until > time) {
       PRESCENE_TRY(const auto simulator, simulators(part.scene, 1.0));
-      simulator->run({&from, 1}, request, action_draws, 0, pool, {&part.trajectory, 1});
+      simulator->run({&from, 1}, request, action_draws, 0, pool, {&part.trajectory, 1}, cancellation);
+      if (part.trajectory.end == belief::TrajectoryEnd::kCancelled)
+        return core::cancelled("stopped on request before the scene was played to its end");
     } else {
       states = {from};
     }

@@ -222,13 +222,14 @@ class Player {
 
 /// What happened in the scene that was played every `interval` s, by looking at it more closely.
 core::Result<HappenedRecord> look_closely(const belief::Scene& scene, const SimulatedRecordingOptions& options,
-                                          double interval, std::uint64_t seed, Backends& backends) {
+                                          double interval, std::uint64_t seed, Backends& backends,
+                                          const core::Cancellation& cancellation) {
   const double most = std::max(1.0, kMostFineStates * interval / scene.duration);
   const double finer = std::clamp(std::round(interval / kFinest), 1.0, std::floor(most));
   std::vector<UnannouncedChange> changes = options.changes;
   for (UnannouncedChange& change : changes) change.time = frame_of_change(scene, change.time, interval);
-  PRESCENE_TRY(const std::vector<PlayedPart> parts,
-               play_scene(scene, changes, backends.simulator_factory(), interval / finer, seed, backends.pool()));
+  PRESCENE_TRY(const std::vector<PlayedPart> parts, play_scene(scene, changes, backends.simulator_factory(),
+                                                               interval / finer, seed, backends.pool(), &cancellation));
   PRESCENE_TRY(const auto simulator, backends.make_simulator(scene));
   HappenedRecord record = happened_in(scene, changes, parts, options.reports_robot);
   record.first_ns = options.start_ns;
@@ -262,8 +263,8 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
                                  "' has no place to record from: give it 'look' or 'pose' in the scene file");
   }
   const double interval = 1.0 / (options.rate * belief::camera_count(scene));
-  PRESCENE_TRY(const std::vector<PlayedPart> parts,
-               play_scene(scene, options.changes, backends.simulator_factory(), interval, seed, backends.pool()));
+  PRESCENE_TRY(const std::vector<PlayedPart> parts, play_scene(scene, options.changes, backends.simulator_factory(),
+                                                               interval, seed, backends.pool(), &cancellation));
   PRESCENE_TRY(const auto renderer, backends.make_renderer());
   Player player(scene, options, seed, backends, *renderer, recording);
 
@@ -294,8 +295,11 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
     PRESCENE_RETURN_IF_ERROR(due[i].write());
     if (progress) progress({static_cast<double>(i + 1) / static_cast<double>(due.size()), {}, ""});
   }
-  PRESCENE_TRY(const HappenedRecord happened, look_closely(scene, options, interval, seed, backends));
-  PRESCENE_RETURN_IF_ERROR(player.write_happened(happened, end));
+  const core::Result<HappenedRecord> happened = look_closely(scene, options, interval, seed, backends, cancellation);
+  if (happened.status().code() == core::StatusCode::kCancelled)
+    return core::cancelled("stopped on request; the frames are kept, without the record of what happened");
+  if (!happened) return happened.status();
+  PRESCENE_RETURN_IF_ERROR(player.write_happened(*happened, end));
   return options.changes.empty() ? player.write_outcomes(parts.back().trajectory) : core::ok_status();
 }
 

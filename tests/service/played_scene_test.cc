@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 #include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
+#include "tests/service/recorded_box.h"
+#include "tests/support/paths.h"
 
 namespace prescene::service {
 namespace {
@@ -174,6 +178,33 @@ TEST(UnannouncedChanges, AreReadFromText) {
   for (const char* text :
        {"", "1:cup", "1:cup:", "1:cup:0,0", "1:cup:0,0,0,0,0", "1:cup:0,0,x", "1::0,0,0", "1:cup:nan,0,0"})
     EXPECT_FALSE(put_from_text(text).ok()) << text;
+}
+
+TEST_F(PlayedSceneTest, IsStoppedOnRequest) {
+  core::Cancellation stop;
+  stop.request();
+  for (const std::vector<UnannouncedChange>& changes :
+       {std::vector<UnannouncedChange>{}, std::vector<UnannouncedChange>{{0.5, "left", std::nullopt}}})
+    EXPECT_EQ(
+        play_scene(*scene_, changes, backends_.simulator_factory(), kFrameInterval, 1, pool_, &stop).status().code(),
+        core::StatusCode::kCancelled);
+}
+
+TEST_F(PlayedSceneTest, ARecordingIsStoppedWhileWhatHappenedIsLookedAt) {
+  const auto scene = load_scene_text(tests::box_on_table("0.3"), "made.yaml", {});
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  const tests::ScratchDir folder;
+  const auto recording = RecordingWriter::create(folder.path() / "stopped.mcap", {});
+  ASSERT_TRUE(recording.ok()) << recording.status().message();
+  core::Cancellation stop;
+  // The last frame is followed by nothing but that.
+  const auto at_the_end = [&](const core::Progress& progress) {
+    if (progress.fraction >= 1.0) stop.request();
+  };
+  SimulatedRecordingOptions options;
+  options.rate = 10.0;
+  EXPECT_EQ(simulate_recording(**scene, options, 1, backends_, stop, at_the_end, **recording).code(),
+            core::StatusCode::kCancelled);
 }
 
 }  // namespace

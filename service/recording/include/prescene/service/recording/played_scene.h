@@ -11,6 +11,7 @@
 #include "prescene/belief/scene.h"
 #include "prescene/belief/trajectory.h"
 #include "prescene/core/parallel.h"
+#include "prescene/core/progress.h"
 #include "prescene/core/status.h"
 #include "prescene/simulation/simulator.h"
 
@@ -45,9 +46,10 @@ double frame_of_change(const belief::Scene& scene, double time, double interval)
 
 /// One instance of `scene`, drawn with `seed`, sampled every `interval` s. It goes on after everything has come to
 /// rest. kInvalidInput where a change names no object of the scene, lies outside its duration, or, it or its frame,
-/// within an action other than a push; errors of the factory.
+/// within an action other than a push; errors of the factory; kCancelled.
 core::Result<std::vector<PlayedPart>> play_scene(const belief::Scene& scene, std::vector<UnannouncedChange> changes,
                                                  const simulation::SimulatorFactory& simulators, double interval,
-                                                 std::uint64_t seed, core::ThreadPool& pool);
+                                                 std::uint64_t seed, core::ThreadPool& pool,
+                                                 const core::Cancellation* cancellation = nullptr);
 
 }  // namespace prescene::service
