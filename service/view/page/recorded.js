@@ -48,8 +48,11 @@ export class RecordedProgram {
   show(index, camera) {
     const { steps } = this.data, own = this.pictures.get(camera) ?? [];
     if (!steps.length) return;
-    const step = steps[lastUntil(steps, index)];
-    if (own.length) this.receivePicture(pictureMessage(1, own[lastUntil(own, step.index)]));
-    this.receive(step);
+    const step = steps[lastUntil(steps, index)], picture = own.length ? own[lastUntil(own, step.index)] : null;
+    if (picture) this.receivePicture(pictureMessage(1, picture));
+    // Of several cameras, which take turns, the newest picture is a few steps old. Another one is not of this step: the
+    // picture at it was left out.
+    const age = picture ? step.index - picture.index : 0;
+    this.receive(age >= 0 && age < Math.max(1, this.pictures.size) ? step : { ...step, pictureAge: age });
   }
 }

@@ -188,14 +188,16 @@ function redraw() {
     if (!step) return;
     const shown = page.shownAnswer && page.shownAnswer.predict ? shownEnds(page.shownAnswer.predict) : null;
     space.draw(step, { dark: dark(), ghosts: page.ghosts, selected: page.selected, colors: page.colors, answer: shown });
-    if (page.overlay) overlay.draw(step, page.indexes);
+    // Outlines of one step do not fit the picture of another.
+    if (page.overlay && !step.pictureAge) overlay.draw(step, page.indexes);
     else overlay.clear();
     list.show(step.objects, page.colors, page.selected);
     trends.show(step, page.colors, page.selected, dark());
     const isLive = page.mode === 'live';
     bands.draw({ index: step.index, steps: page.steps, first: isLive && trends.rows.length ? trends.rows[0][0] : 0, selected: page.selected, dark: dark(), fixed: isLive });
     $('scrub').value = page.mode === 'live' ? $('scrub').max : step.index;
-    $('clock').textContent = step.time.toFixed(2) + ' s, step ' + step.step;
+    const age = step.pictureAge ?? 0;
+    $('clock').textContent = step.time.toFixed(2) + ' s' + (age ? ' (picture ' + Math.abs(age) + ' steps ' + (age > 0 ? 'older' : 'newer') + ')' : '') + ', step ' + step.step;
   });
 }
 
