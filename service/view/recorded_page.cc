@@ -64,20 +64,23 @@ void replace_once(std::string& text, const std::string& what, const std::string&
 
 std::string counted_left_out(const ThinnedTexts& texts, const std::string& what) {
   if (texts.kept().size() == texts.added()) return "";
+  const std::string changes = texts.marked_left_out() > 0
+                                  ? " (" + std::to_string(texts.marked_left_out()) + " of these are left out, too)."
+                                  : ".";
   return "Of " + std::to_string(texts.added()) + " " + what + " " + std::to_string(texts.kept().size()) +
-         " are kept here: one in " + std::to_string(texts.stride()) + ", and those at which a state changed.";
+         " are kept here: one in " + std::to_string(texts.stride()) + ", and those at which a state changed" + changes;
 }
 
 }  // namespace
 
 void ThinnedTexts::add(std::string text, bool is_marked) {
-  const std::uint64_t number = added_++;
-  if (!is_marked && number % stride_ != 0) return;
+  if (!wants_next(is_marked)) return skip();
   bytes_ += text.size();
-  kept_.push_back({number, std::move(text), is_marked});
+  kept_.push_back({added_++, std::move(text), is_marked, is_marked});
   while (bytes_ > most_bytes_) {
     if (kept_.size() == 1) {  // it alone is larger than all the room
       bytes_ = 0;
+      marked_left_out_ += kept_.front().was_marked ? 1 : 0;
       kept_.clear();
       return;
     }
@@ -92,8 +95,10 @@ void ThinnedTexts::add(std::string text, bool is_marked) {
     }
     std::erase_if(kept_, [this](const Text& one) {
       const bool goes = !one.is_marked && one.number % stride_ != 0;
-      if (goes) bytes_ -= one.text.size();
-      return goes;
+      if (!goes) return false;
+      bytes_ -= one.text.size();
+      marked_left_out_ += one.was_marked ? 1 : 0;
+      return true;
     });
   }
 }
@@ -113,18 +118,28 @@ void RecordedPage::add(const ShownStep& given) {
   history_.add(summary, count_);
   const bool is_change = history_.revision() != revision || history_.runs().size() != runs;
   time_ = history_.seconds_of(summary.stamp_ns);
-  ordered_json document = step_document(step, summary, count_);
-  document["time"] = time_;
-  steps_.add(belief::json_text(document), is_change);
-  const std::string jpeg = picture_jpeg(step.observation, kPagePictureWidth, kPagePictureQuality);
-  if (!jpeg.empty())
-    pictures_.add(belief::json_text(JsonFields()
-                                        .count("index", count_)
-                                        .count("camera", static_cast<std::uint64_t>(camera))
-                                        .text("jpeg", base64_of(jpeg))
-                                        .take()),
-                  is_change);
+  if (steps_.wants_next(is_change)) {
+    ordered_json document = step_document(step, summary, count_);
+    document["time"] = time_;
+    steps_.add(belief::json_text(document), is_change);
+  } else {
+    steps_.skip();
+  }
+  add_picture(step.observation, is_change);
   ++count_;
+}
+
+void RecordedPage::add_picture(const belief::Observation& observation, bool is_change) {
+  if (!observation.frame.color && !observation.frame.depth) return;
+  if (!pictures_.wants_next(is_change)) return pictures_.skip();  // encoding takes longer than all else of a step
+  const std::string jpeg = picture_jpeg(observation, kPagePictureWidth, kPagePictureQuality);
+  if (jpeg.empty()) return;
+  pictures_.add(belief::json_text(JsonFields()
+                                      .count("index", count_)
+                                      .count("camera", static_cast<std::uint64_t>(observation.camera))
+                                      .text("jpeg", base64_of(jpeg))
+                                      .take()),
+                is_change);
 }
 
 void RecordedPage::add_answer(const std::string& json) {

@@ -145,29 +145,53 @@ TEST(RecordedPage, OfALongRecordingEveryFewStepsAreKept) {
   EXPECT_TRUE(data["answers"].empty());
 }
 
+// Where something changes at each step, most of the changes are left out as well: the page says how many.
+TEST(RecordedPage, SaysHowManyChangesAreLeftOut) {
+  RecordedPage page({"restless", 40'000, 30'000, 100});
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    ShownStep shown = tests::shown_step(i + 1);
+    auto belief = std::make_shared<belief::Belief>(*shown.belief);
+    if (i % 2 == 1) belief->objects[0].state = belief::TrackState::kDoubtful;
+    shown.belief = belief;
+    page.add(shown);
+  }
+  const ordered_json data = ordered_json::parse(page.data());
+  ASSERT_EQ(data["remarks"].size(), 2U);
+  // All steps change a state, so that all that are not kept are such.
+  const std::size_t left_out = 400 - data["steps"].size();
+  EXPECT_THAT(data["remarks"][0].get<std::string>(),
+              HasSubstr("a state changed (" + std::to_string(left_out) + " of these are left out, too)."));
+}
+
 // The law behind it: never more bytes than allowed; what is kept is in order, evenly spread, with the marked ones.
 TEST(ThinnedTexts, AreBoundedAndEvenlySpread) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     core::RandomStream stream(seed, core::Purpose::kTest, 0, 0);
     constexpr std::size_t kMost = 2000;
-    ThinnedTexts texts(kMost);
+    ThinnedTexts texts(kMost), asked_first(kMost);
     std::vector<std::uint64_t> marked;
     const double share = seed % 3 == 0 ? 0.5 : 0.002;  // more marked ones than there is room for, or few
     for (std::uint64_t i = 0; i < 3000; ++i) {
       const bool is_marked = stream.uniform() < share;
       if (is_marked) marked.push_back(i);
-      texts.add(std::string(1 + stream.uniform_below(40), 'x'), is_marked);
+      const std::string text(1 + stream.uniform_below(40), 'x');
+      texts.add(text, is_marked);
+      asked_first.wants_next(is_marked) ? asked_first.add(text, is_marked) : asked_first.skip();
       ASSERT_LE(texts.bytes(), kMost);
+      ASSERT_EQ(texts.kept().size(), asked_first.kept().size());
+      ASSERT_EQ(texts.added(), asked_first.added());
     }
-    std::size_t bytes = 0;
+    std::size_t bytes = 0, marked_kept = 0;
     std::vector<std::uint64_t> numbers;
     for (const ThinnedTexts::Text& one : texts.kept()) {
       bytes += one.text.size();
+      marked_kept += one.was_marked ? 1 : 0;
       EXPECT_TRUE(numbers.empty() || numbers.back() < one.number);
       EXPECT_TRUE(one.is_marked || one.number % texts.stride() == 0);
       numbers.push_back(one.number);
     }
     EXPECT_EQ(bytes, texts.bytes());
+    EXPECT_EQ(marked_kept + texts.marked_left_out(), marked.size());
     EXPECT_EQ(texts.added(), 3000U);
     for (std::uint64_t i = 0; i < 3000; i += texts.stride()) EXPECT_THAT(numbers, ::testing::Contains(i));
     if (share < 0.1) {
@@ -178,6 +202,7 @@ TEST(ThinnedTexts, AreBoundedAndEvenlySpread) {
   small.add(std::string(11, 'x'), true);
   EXPECT_TRUE(small.kept().empty());
   EXPECT_EQ(small.bytes(), 0U);
+  EXPECT_EQ(small.marked_left_out(), 1U);
 }
 
 }  // namespace

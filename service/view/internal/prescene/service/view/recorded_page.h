@@ -30,18 +30,23 @@ class ThinnedTexts {
   struct Text {
     std::uint64_t number = 0;  ///< Of those that were added.
     std::string text;
-    bool is_marked = false;
+    bool is_marked = false;   ///< Stays for now.
+    bool was_marked = false;  ///< When it was added.
   };
   /// A marked one stays where others are left out, until marked ones alone are too many.
   void add(std::string text, bool is_marked);
+  /// Whether add() would keep the next one at all: else skip() takes its place, without its text.
+  bool wants_next(bool is_marked) const { return is_marked || added_ % stride_ == 0; }
+  void skip() { ++added_; }
   const std::vector<Text>& kept() const { return kept_; }
   std::uint64_t added() const { return added_; }
   std::size_t bytes() const { return bytes_; }
   std::uint64_t stride() const { return stride_; }
+  std::uint64_t marked_left_out() const { return marked_left_out_; }
 
  private:
   std::size_t most_bytes_, bytes_ = 0;
-  std::uint64_t added_ = 0, stride_ = 1;
+  std::uint64_t added_ = 0, stride_ = 1, marked_left_out_ = 0;
   std::vector<Text> kept_;
 };
 
@@ -66,6 +71,8 @@ class RecordedPage {
   interfaces::PageBlock page() const;
 
  private:
+  void add_picture(const belief::Observation& observation, bool is_change);
+
   RecordedPageOptions options_;
   std::shared_ptr<const belief::Scene> scene_;
   ViewHistory history_{2000, 2000};
