@@ -162,6 +162,10 @@ std::string RecordedPage::data() const {
   std::vector<std::string> remarks;
   for (std::string remark : {counted_left_out(steps_, "steps"), counted_left_out(pictures_, "pictures")})
     if (!remark.empty()) remarks.push_back(std::move(remark));
+  if (history_.forgotten_steps() > 0)
+    remarks.push_back(
+        "Of the first " + std::to_string(history_.forgotten_steps()) +
+        " steps there are no curves: an object or a parameter was no longer there, or the clock went back.");
   if (answers_left_out_ > 0) remarks.push_back(std::to_string(answers_left_out_) + " long answers are left out.");
   const auto as_is = [](const std::string& text) { return text; };
   const auto kept = [](const ThinnedTexts::Text& one) { return one.text; };

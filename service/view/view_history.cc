@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -23,24 +24,30 @@ std::vector<std::string> columns_of(const BeliefSummary& summary) {
   return columns;
 }
 
+std::vector<std::string> names_of(const BeliefSummary& summary) {
+  std::vector<std::string> names;
+  for (const ObjectSummary& object : summary.objects) names.push_back(object.name);
+  return names;
+}
+
+/// Of each of the old ones, which of the new it is; nothing where one is not among them.
+std::optional<std::vector<std::size_t>> places_among(const std::vector<std::string>& old_names,
+                                                     const std::vector<std::string>& new_names) {
+  std::vector<std::size_t> places;
+  for (const std::string& name : old_names) {
+    const auto found = std::find(new_names.begin(), new_names.end(), name);
+    if (found == new_names.end()) return std::nullopt;
+    places.push_back(static_cast<std::size_t>(found - new_names.begin()));
+  }
+  return places;
+}
+
 }  // namespace
 
 bool ViewHistory::add(const BeliefSummary& summary, std::uint64_t index) {
   std::vector<std::string> columns = columns_of(summary);
-  if (columns != columns_ || summary.stamp_ns < last_ns_ || rows_.empty()) {
-    columns_ = std::move(columns);
-    rows_.clear();
-    stride_ = 1;
-    seen_ = 0;
-    first_ns_ = summary.stamp_ns;
-    ++revision_;
-    objects_.clear();
-    for (const ObjectSummary& object : summary.objects) objects_.push_back(object.name);
-    runs_.clear();
-    current_.clear();
-    shortest_run_ = 0.0;
-    joined_ = 0;
-  }
+  if (rows_.empty() || summary.stamp_ns < last_ns_ || (columns != columns_ && !make_room_for(summary, columns)))
+    begin_anew(summary, std::move(columns));
   last_ns_ = summary.stamp_ns;
   add_runs(summary, index);
   if (seen_++ % stride_ != 0) return false;
@@ -63,13 +70,48 @@ bool ViewHistory::add(const BeliefSummary& summary, std::uint64_t index) {
   return true;
 }
 
+void ViewHistory::begin_anew(const BeliefSummary& summary, std::vector<std::string>&& columns) {
+  forgotten_ += seen_;
+  columns_ = std::move(columns);
+  rows_.clear();
+  stride_ = 1;
+  seen_ = 0;
+  first_ns_ = summary.stamp_ns;
+  ++revision_;
+  objects_ = names_of(summary);
+  runs_.clear();
+  current_.assign(objects_.size(), std::nullopt);
+  shortest_run_ = 0.0;
+  joined_ = 0;
+}
+
+/// What was before stays, in the new columns and under the new numbers of the objects; false where one of them went.
+bool ViewHistory::make_room_for(const BeliefSummary& summary, const std::vector<std::string>& columns) {
+  const std::vector<std::string> objects = names_of(summary);
+  const auto new_columns = places_among(columns_, columns), new_objects = places_among(objects_, objects);
+  if (!new_columns || !new_objects) return false;
+  for (Row& row : rows_) {
+    std::vector<double> values(columns.size(), std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t i = 0; i < row.values.size(); ++i) values[(*new_columns)[i]] = row.values[i];
+    row.values = std::move(values);
+  }
+  for (Run& run : runs_) run.object = (*new_objects)[run.object];
+  decltype(current_) current(objects.size());
+  for (std::size_t i = 0; i < current_.size(); ++i) current[(*new_objects)[i]] = std::move(current_[i]);
+  current_ = std::move(current);
+  columns_ = columns;
+  objects_ = objects;
+  ++revision_;
+  return true;
+}
+
 void ViewHistory::add_runs(const BeliefSummary& summary, std::uint64_t index) {
   for (std::size_t i = 0; i < summary.objects.size(); ++i) {
     const ObjectSummary& object = summary.objects[i];
     const std::string held_by = object.held_by.value_or("");
-    if (i < current_.size() && current_[i] == std::pair(object.state, held_by)) continue;
-    if (i == current_.size()) current_.emplace_back();
-    current_[i] = {object.state, held_by};
+    const std::pair now(object.state, held_by);
+    if (current_[i] == now) continue;
+    current_[i] = now;
     runs_.push_back({i, index, seconds_of(summary.stamp_ns), object.state, held_by});
   }
   if (runs_.size() > std::max(most_runs_, 2 * objects_.size())) join_short_runs();
@@ -107,7 +149,8 @@ nlohmann::ordered_json to_json(const ViewHistory::Row& row) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   json.push_back(row.index);
   json.push_back(std::round(row.time * 1e4) / 1e4);
-  for (const double value : row.values) json.push_back(value);
+  for (const double value : row.values)
+    json.push_back(std::isnan(value) ? nlohmann::ordered_json() : nlohmann::ordered_json(value));
   return json;
 }
 
@@ -134,6 +177,7 @@ nlohmann::ordered_json to_json(const ViewHistory& history) {
       .field("runs", std::move(runs))
       .number("shortest_run", history.shortest_run())
       .count("joined_runs", history.joined_runs())
+      .count("forgotten_steps", history.forgotten_steps())
       .take();
 }
 

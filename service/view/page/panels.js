@@ -113,6 +113,8 @@ class Chart {
   // lines: [{name, color, points: [[t, value, deviation?]...], dashed}]
   draw(lines, range, now, limits, dark) {
     Object.assign(this, { range, lines });
+    // What was not there yet has no value.
+    lines = lines.map((line) => ({ ...line, points: line.points.filter(([, v]) => v !== null) }));
     const ratio = Math.min(2, devicePixelRatio || 1), { canvas, left } = this, w = canvas.clientWidth, h = canvas.clientHeight;
     if (!w) return;
     if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) { canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/view/view_content.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "prescene/service/view/view_history.h"
@@ -91,6 +92,53 @@ TEST(ViewHistory, BeginsAnewWhereTheClockWentBack) {
   history.add(summary_at(2), 2);
   EXPECT_EQ(history.rows().size(), 1U);
   EXPECT_NE(history.revision(), revision);
+  EXPECT_EQ(history.forgotten_steps(), 2U);
+}
+
+// A second object joins before the first one in the list; then it goes.
+TEST(ViewHistory, ANewObjectLeavesTheEarlierCurves) {
+  const auto with_another = [](std::uint64_t step) {
+    BeliefSummary summary = summary_at(step);
+    ObjectSummary another = summary.objects[0];
+    another.name = "another";
+    another.confidence = 0.25;
+    summary.objects.insert(summary.objects.begin(), another);
+    return summary;
+  };
+  ViewHistory alone, history;
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    alone.add(summary_at(i), i);
+    history.add(summary_at(i), i);
+  }
+  const std::uint64_t revision = history.revision();
+  history.add(with_another(3), 3);
+  EXPECT_NE(history.revision(), revision);
+  EXPECT_EQ(history.forgotten_steps(), 0U);
+  ASSERT_EQ(history.rows().size(), 4U);
+  ASSERT_EQ(history.columns().size(), 2 * alone.columns().size());
+  for (std::size_t column = 0; column < history.columns().size(); ++column) {
+    const auto own = std::find(alone.columns().begin(), alone.columns().end(), history.columns()[column]);
+    for (std::size_t row = 0; row < 3; ++row) {
+      const double value = history.rows()[row].values[column];
+      if (own == alone.columns().end()) {
+        EXPECT_TRUE(std::isnan(value)) << history.columns()[column];
+      } else {
+        EXPECT_EQ(value, alone.rows()[row].values[static_cast<std::size_t>(own - alone.columns().begin())]);
+      }
+    }
+    EXPECT_FALSE(std::isnan(history.rows()[3].values[column]));
+  }
+  EXPECT_TRUE(to_json(history.rows()[0])[2].is_null());
+  // Its first state begins at its step; that of the other goes on.
+  ASSERT_EQ(history.runs().size(), 2U);
+  EXPECT_EQ(history.objects(), (std::vector<std::string>{"another", alone.objects()[0]}));
+  EXPECT_EQ(history.runs()[0].object, 1U);
+  EXPECT_EQ(history.runs()[0].index, 0U);
+  EXPECT_EQ(history.runs()[1].object, 0U);
+  EXPECT_EQ(history.runs()[1].index, 3U);
+  history.add(summary_at(4), 4);
+  EXPECT_EQ(history.rows().size(), 1U);
+  EXPECT_EQ(history.forgotten_steps(), 4U);
 }
 
 BeliefSummary state_at(std::uint64_t step, belief::TrackState state, const std::string& held_by = "") {

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,8 +23,8 @@ class ViewHistory {
 
   struct Row {
     std::uint64_t index = 0;
-    double time = 0.0;  ///< s since the first row's stamp.
-    std::vector<double> values;
+    double time = 0.0;           ///< s since the first row's stamp.
+    std::vector<double> values;  ///< NaN where there was no such object or parameter yet.
   };
   /// An object's state from a step on, until its next run begins or the history ends.
   struct Run {
@@ -33,8 +34,9 @@ class ViewHistory {
     belief::TrackState state = belief::TrackState::kTracked;
     std::string held_by;  ///< The hand; "" = free.
   };
-  /// Takes a step in; false where it was left out, as its neighbours stand for it. Other objects or parameters than
-  /// before, or a stamp before the last, begin anew (columns() changes).
+  /// Takes a step in; false where it was left out, as its neighbours stand for it. Objects and parameters may join
+  /// (columns() changes). Where one is missing that was there before, or after a stamp before the last, it begins anew;
+  /// forgotten_steps() counts those before.
   bool add(const BeliefSummary& summary, std::uint64_t index);
 
   /// Of each object "NAME/state" (0 tracked, 1 doubtful, 2 unseen, 3 lost), "NAME/confidence", "NAME/existence", and of
@@ -47,11 +49,14 @@ class ViewHistory {
   const std::vector<Run>& runs() const { return runs_; }
   double shortest_run() const { return shortest_run_; }  ///< s; 0 = none was joined.
   std::uint64_t joined_runs() const { return joined_; }
-  /// Changes whenever rows or runs were taken away: who kept a copy needs a new one.
+  std::uint64_t forgotten_steps() const { return forgotten_; }
+  /// Changes whenever rows, runs or columns are others than before: who kept a copy needs a new one.
   std::uint64_t revision() const { return revision_; }
   double seconds_of(core::TimeNs stamp_ns) const { return 1e-9 * static_cast<double>(stamp_ns - first_ns_); }
 
  private:
+  void begin_anew(const BeliefSummary& summary, std::vector<std::string>&& columns);
+  bool make_room_for(const BeliefSummary& summary, const std::vector<std::string>& columns);
   void add_runs(const BeliefSummary& summary, std::uint64_t index);
   void join_short_runs();
 
@@ -59,18 +64,19 @@ class ViewHistory {
   std::vector<std::string> columns_, objects_;
   std::vector<Row> rows_;
   std::vector<Run> runs_;
-  std::vector<std::pair<belief::TrackState, std::string>> current_;  // of each object: state and hand
+  std::vector<std::optional<std::pair<belief::TrackState, std::string>>> current_;  // of each object: state and hand
   double shortest_run_ = 0.0;
-  std::uint64_t joined_ = 0;
+  std::uint64_t joined_ = 0, forgotten_ = 0;
   std::uint64_t stride_ = 1, seen_ = 0, revision_ = 0;
   core::TimeNs first_ns_ = 0, last_ns_ = 0;
 };
 
-/// [index, time, values...]
+/// [index, time, values...], with null for NaN
 nlohmann::ordered_json to_json(const ViewHistory::Row& row);
 /// [object's place, index, time, state, held_by], with null for a free one
 nlohmann::ordered_json to_json(const ViewHistory::Run& run);
-/// {"op": "history", "columns", "rows", "objects", "runs", "shortest_run", "joined_runs"}
+/// {"op": "history", "columns", "rows", "objects", "runs", "shortest_run", "joined_runs",
+/// "forgotten_steps"}
 nlohmann::ordered_json to_json(const ViewHistory& history);
 
 }  // namespace prescene::service
