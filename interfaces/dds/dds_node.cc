@@ -32,7 +32,7 @@ namespace prescene::interfaces {
 core::Status dds_status(dds_return_t code, const std::string& doing) {
   if (code >= 0) return core::ok_status();
   return core::unavailable(doing + ": " + dds_strretcode(-code) +
-                           "; Cyclone DDS prints the cause above, CYCLONEDDS_URI sets it up");
+                           "; Cyclone DDS gives the cause above, CYCLONEDDS_URI sets it up");
 }
 
 namespace {
@@ -233,6 +233,7 @@ core::Result<std::unique_ptr<DdsNode>> DdsNode::create(const DdsOptions& options
   PRESCENE_RETURN_IF_ERROR(check_descriptors());
   auto impl = std::make_unique<Impl>();
   impl->options = options;
+  impl->cyclone_log.emplace(options.domain, log);
   const auto domain_id = static_cast<dds_domainid_t>(options.domain);
   InterfaceListener listener(options.find_interfaces);
   const dds_entity_t domain = dds_create_domain(domain_id, configuration_of(options).c_str());

@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -16,6 +17,7 @@
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
 #include "bus_census.h"
+#include "cyclone_log.h"
 #include "graph_announcement.h"
 #include "prescene/interfaces/dds/dds_node.h"
 #include "topic_table.h"
@@ -50,6 +52,7 @@ struct DdsNode::Impl {
   };
 
   DdsOptions options;
+  std::optional<CycloneLog> cyclone_log;  // ends last
   dds_entity_t participant = 0;
   dds_entity_t waitset = 0;
   dds_entity_t stop = 0;

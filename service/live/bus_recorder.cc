@@ -8,6 +8,7 @@
 #include "prescene/core/clock.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/live/inbox.h"
+#include "prescene/service/live/log_limiter.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/camera_presets.h"
@@ -40,7 +41,8 @@ core::Result<std::uint64_t> record_topics(const interfaces::DdsOptions& dds, con
                    {camera.topics.tf, kWaitingTransforms},
                    {camera.topics.joint_states, kWaitingTransforms}});
   Inbox inbox(limits);
-  PRESCENE_TRY(const auto node, interfaces::DdsNode::create(dds, log));
+  LogLimiter bus_log(log, {});
+  PRESCENE_TRY(const auto node, interfaces::DdsNode::create(dds, bus_log.sink()));
   for (const BusTopic& topic : topics_of_cameras(cameras)) {
     PRESCENE_RETURN_IF_ERROR(
         node->subscribe(topic.name, topic.type, topic.read,

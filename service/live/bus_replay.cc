@@ -18,6 +18,7 @@
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/live/log_limiter.h"
 #include "prescene/service/live/question_client.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/tracking/topics.h"
@@ -288,7 +289,8 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
   Listener listener;
   interfaces::DdsOptions dds = options.dds;
   dds.node_name = "prescene_replay";
-  PRESCENE_TRY(const auto node, interfaces::DdsNode::create(dds, log));
+  LogLimiter bus_log(log, {});
+  PRESCENE_TRY(const auto node, interfaces::DdsNode::create(dds, bus_log.sink()));
   BusPlayer player(*node, listener);
   PRESCENE_RETURN_IF_ERROR(player.open());
 

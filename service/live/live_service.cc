@@ -91,7 +91,7 @@ core::Result<std::unique_ptr<LiveService>> LiveService::create(std::shared_ptr<c
   auto impl = std::make_unique<Impl>(std::move(scene), settings, std::move(tracker), std::move(recording), log);
   impl->backends = &backends;
   if (settings.planning_scene) impl->planning.prepare(*impl->scene);
-  PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, log));
+  PRESCENE_TRY(impl->node, interfaces::DdsNode::create(settings.dds, impl->log));
   Impl* raw = impl.get();
   const auto on_answer = [raw](const std::string& answer) {  // on several threads
     raw->check_sent(raw->node->publish(raw->answers, interfaces::RosString{answer}));

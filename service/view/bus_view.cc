@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/service/live/log_limiter.h"
 #include "prescene/service/outside_json.h"
 #include "prescene/service/tracking/camera_frames.h"
 #include "prescene/service/tracking/topics.h"
@@ -66,6 +67,7 @@ struct BusView::Impl {
       : settings(of),
         given_scene(std::move(a_scene)),
         log(std::move(a_log)),
+        bus_log(log, {}),
         cameras(camera_inputs(of.tracker, given_scene ? *given_scene : belief::Scene())),
         frames(cameras, given_scene ? robot_names(*given_scene) : std::vector<std::string>(), of.tracker.tf),
         scene(given_scene) {}
@@ -73,6 +75,7 @@ struct BusView::Impl {
   BusViewSettings settings;
   std::shared_ptr<const belief::Scene> given_scene;
   core::LogSink log;
+  LogLimiter bus_log;  // of what the middleware says
 
   std::vector<CameraInput> cameras;
 
@@ -112,7 +115,7 @@ core::Result<std::unique_ptr<BusView>> BusView::create(const std::shared_ptr<con
   PRESCENE_TRY(impl->view, LiveView::create(std::move(shown), options, log));
   interfaces::DdsOptions dds = settings.dds;
   dds.node_name = "prescene_view";
-  PRESCENE_TRY(impl->node, interfaces::DdsNode::create(dds, log));
+  PRESCENE_TRY(impl->node, interfaces::DdsNode::create(dds, impl->bus_log.sink()));
   PRESCENE_RETURN_IF_ERROR(impl->join());
   return std::unique_ptr<BusView>(new BusView(std::move(impl)));
 }

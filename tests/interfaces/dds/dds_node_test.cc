@@ -5,6 +5,7 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <condition_variable>
@@ -19,8 +20,10 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include <dds/ddsrt/log.h>
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "tests/support/bus_domain.h"
 #include "tests/support/paths.h"
@@ -504,6 +507,34 @@ TEST(DdsNode, SaysWhenTheSystemGrantsASmallerReceiveBuffer) {
   EXPECT_TRUE(DdsNode::create(greedy, log).ok());
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_NE(lines[0].find("sysctl -w net.core.rmem_max=2147483647"), std::string::npos) << lines[0];
+}
+
+TEST(DdsNode, WhatCycloneSaysIsInTheLogOfItsNode) {
+  std::mutex mutex;
+  std::vector<std::pair<core::LogLevel, std::string>> lines;
+  const auto log = [&](core::LogLevel level, const std::string& line) {
+    const std::lock_guard lock(mutex);
+    lines.emplace_back(level, line);
+  };
+  const auto said = [&](std::uint32_t level, const char* text, const std::string& line) {
+    dds_log(level, __FILE__, __LINE__, "test", "%s\n", text);
+    const std::lock_guard lock(mutex);
+    return std::count_if(lines.begin(), lines.end(), [&](const auto& one) { return one.second == line; });
+  };
+  {
+    const auto node = DdsNode::create(options(), log);
+    ASSERT_TRUE(node.ok()) << node.status().message();
+    EXPECT_EQ(said(DDS_LC_WARNING, "a peer sends \x1b[31m\xff", "Cyclone DDS: a peer sends ?[31m?"), 1);
+    EXPECT_EQ(lines.back().first, core::LogLevel::kWarning);
+    const auto without_log = DdsNode::create(options(), {});
+    EXPECT_EQ(said(DDS_LC_ERROR, "it ends", "Cyclone DDS: it ends"), 1);
+    EXPECT_EQ(lines.back().first, core::LogLevel::kError);
+    const auto later = DdsNode::create(options(), log);
+    EXPECT_EQ(said(DDS_LC_WARNING, "once", "Cyclone DDS: once"), 1) << "the oldest gets it";
+  }
+  EXPECT_EQ(said(DDS_LC_WARNING, "nobody listens", "Cyclone DDS: nobody listens"), 0);
+  const auto again = DdsNode::create(options(), log);
+  EXPECT_EQ(said(DDS_LC_WARNING, "again", "Cyclone DDS: again"), 1);
 }
 
 TEST(DdsNode, AnnouncesItselfInEitherForm) {

@@ -112,7 +112,8 @@ class DdsNode {
  public:
   /// Joins the bus. Fails with kUnavailable and Cyclone's own words when the participant can't be made (a misspelt
   /// CYCLONEDDS_URI, no network interface, a certificate that the authority did not sign), kInvalidInput for options
-  /// out of range and a security folder without one of its files.
+  /// out of range and a security folder without one of its files. What Cyclone says while the node lives goes to `log`,
+  /// too, from any of its threads, as often as others make it say something; where `log` is empty, it is printed.
   static core::Result<std::unique_ptr<DdsNode>> create(const DdsOptions& options, const core::LogSink& log);
   ~DdsNode();
   DdsNode(const DdsNode&) = delete;

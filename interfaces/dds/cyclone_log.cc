@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cyclone_log.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <dds/ddsrt/log.h>
+#include "prescene/core/utf8.h"
+
+namespace prescene::interfaces {
+namespace {
+
+struct Listening {
+  const CycloneLog* owner;
+  std::uint32_t domain;
+  core::LogSink log;
+};
+
+/// Cyclone has one sink for the process.
+struct AllListening {
+  std::mutex changing;  // held while Cyclone is told, which waits for calls of its sink; not taken in these
+  std::mutex mutex;     // guards the list; held while a sink is called, so that none is after its end
+  std::vector<Listening> list;
+};
+AllListening& all_listening() {
+  static AllListening all;
+  return all;
+}
+
+core::LogLevel level_of(std::uint32_t priority) {
+  if ((priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0) return core::LogLevel::kError;
+  return (priority & DDS_LC_WARNING) != 0 ? core::LogLevel::kWarning : core::LogLevel::kInfo;
+}
+
+/// One line of text: there may be bytes in it that a peer sent.
+std::string line_of(std::string_view said) {
+  std::string line = "Cyclone DDS: ";
+  said = said.substr(0, said.find_last_not_of(" \n") + 1);
+  for (std::size_t i = 0; i < said.size();) {
+    const std::size_t length = core::utf8_length_at(said, i);
+    const auto byte = static_cast<unsigned char>(said[i]);
+    if (length == 0 || byte < 0x20 || byte == 0x7f)
+      line += '?';
+    else
+      line += said.substr(i, length);
+    i += std::max<std::size_t>(length, 1);
+  }
+  return line;
+}
+
+void pass_on(const dds_log_data_t& said) {
+  AllListening& all = all_listening();
+  const std::lock_guard lock(all.mutex);
+  if (all.list.empty()) return;
+  const auto own =
+      std::find_if(all.list.begin(), all.list.end(), [&](const Listening& one) { return one.domain == said.domid; });
+  core::log((own != all.list.end() ? *own : all.list.front()).log, level_of(said.priority),
+            line_of({said.message, said.size}));
+}
+
+void take_from_cyclone(void* /*unused*/, const dds_log_data_t* said) {
+  // What a sink makes Cyclone say is not for a sink.
+  thread_local bool is_inside = false;
+  if (is_inside) return;
+  is_inside = true;
+  try {
+    pass_on(*said);
+  } catch (...) {  // no exception may pass through Cyclone; the line is lost
+  }
+  is_inside = false;
+}
+
+}  // namespace
+
+CycloneLog::CycloneLog(int domain, core::LogSink log) {
+  if (!log) return;
+  AllListening& all = all_listening();
+  const std::lock_guard changing(all.changing);
+  bool is_first = false;
+  {
+    const std::lock_guard lock(all.mutex);
+    is_first = all.list.empty();
+    all.list.push_back({this, static_cast<std::uint32_t>(domain), std::move(log)});
+  }
+  if (is_first) dds_set_log_sink(take_from_cyclone, nullptr);
+}
+
+CycloneLog::~CycloneLog() {
+  AllListening& all = all_listening();
+  const std::lock_guard changing(all.changing);
+  bool is_last = false;
+  {
+    const std::lock_guard lock(all.mutex);
+    const std::size_t removed = std::erase_if(all.list, [&](const Listening& one) { return one.owner == this; });
+    is_last = removed > 0 && all.list.empty();
+  }
+  if (is_last) dds_set_log_sink(nullptr, nullptr);
+}
+
+}  // namespace prescene::interfaces
