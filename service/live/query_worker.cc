@@ -201,7 +201,7 @@ void QueryWorker::read_questions() {
       }
     }
     if (question)
-      read(question->item, question->client);
+      read(question->item, *question->client);
     else
       refuse(refusal.id, refusal.reason);
   }
@@ -295,7 +295,7 @@ std::optional<FairQueue<QueryWorker::Work>::Entry> QueryWorker::take_next() {
   };
   return waiting_.pop_if([&](const std::string& client, const Work& work) {
     return std::none_of(in_work_.begin(), in_work_.end(), [&](const Simulating& one) {
-      return one.work.question && (one.client == client || (is_of_frames(one.work) && is_of_frames(work)));
+      return one.work.question && (*one.client == client || (is_of_frames(one.work) && is_of_frames(work)));
     });
   });
 }

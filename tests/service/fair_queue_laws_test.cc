@@ -7,6 +7,7 @@
 #include <set>
 
 #include "prescene/core/random.h"
+#include "tests/support/allocations.h"
 
 namespace prescene::service::fair_queue_laws_test {
 namespace {
@@ -114,13 +115,14 @@ TEST(FairQueue, LawsHoldInRandomUse) {
         for (const auto& [client, items] : waiting) count += items.size();
         ASSERT_EQ(next.has_value(), count > 0);
         if (!next) continue;
-        EXPECT_EQ(next->client, next->item.client);
-        EXPECT_EQ(*waiting[next->client].begin(), next->item.number) << "not the oldest";
-        waiting[next->client].erase(next->item.number);
-        served_since[next->client].clear();
+        const std::string& served = *next->client;
+        EXPECT_EQ(served, next->item.client);
+        EXPECT_EQ(*waiting[served].begin(), next->item.number) << "not the oldest";
+        waiting[served].erase(next->item.number);
+        served_since[served].clear();
         for (const auto& [client, items] : waiting) {
-          if (client == next->client || items.empty()) continue;
-          EXPECT_LE(++served_since[client][next->client], 1) << client << " waits while " << next->client << " goes on";
+          if (client == served || items.empty()) continue;
+          EXPECT_LE(++served_since[client][served], 1) << client << " waits while " << served << " goes on";
         }
       }
       std::size_t count = 0, sum = 0;
@@ -134,6 +136,23 @@ TEST(FairQueue, LawsHoldInRandomUse) {
       EXPECT_LE(sum, limits.bytes_of_all);
     }
   }
+}
+
+TEST(FairQueue, TakingOutTakesNoMemory) {
+  if (!tests::can_count_allocations()) GTEST_SKIP() << "sanitizers bring an allocator of their own";
+  FairQueue<std::string> queue({10, 100, 1000});
+  const std::string one(100, 'a'), other(100, 'b');  // too long to be kept without memory
+  queue.push(one, std::string(100, '1'), 1);
+  queue.push(one, std::string(100, '2'), 1);
+  queue.push(other, std::string(100, '3'), 1);
+  tests::fail_allocation_after(0);
+  const auto first = queue.pop(), second = queue.pop(), third = queue.pop();
+  EXPECT_TRUE(tests::stop_failing_allocations());
+  ASSERT_TRUE(first && second && third);
+  EXPECT_EQ(*first->client, one);
+  EXPECT_EQ(*second->client, other);
+  EXPECT_EQ(*third->client, one);
+  EXPECT_EQ(third->item, std::string(100, '2'));
 }
 
 TEST(FairQueue, WhoMayNotGoIsPassedOverAndKeepsTheTurn) {

@@ -4,13 +4,14 @@
 //
 //   FairQueue<std::string> queue({.of_client = 2, .of_all = 3});
 //   for (const auto& refused : queue.push("robot", "where is the mug?", 17)) ... refused.bound, refused.item;
-//   if (const auto next = queue.pop()) ... next->client, next->item;
+//   if (const auto next = queue.pop()) ... *next->client, next->item;
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -32,7 +33,7 @@ template <class Item>
 class FairQueue {
  public:
   struct Entry {
-    std::string client;
+    std::shared_ptr<const std::string> client;  ///< Never null.
     Item item;
   };
   struct Refused {
@@ -49,7 +50,7 @@ class FairQueue {
     std::vector<Refused> refused;
     Waiting& own = clients_[client];
     if (!own.has_turn) {
-      turns_.push_back(client);
+      turns_.push_back(std::make_shared<const std::string>(client));
       own.has_turn = true;
     }
     own.items.push_back({std::move(item), bytes});
@@ -65,19 +66,20 @@ class FairQueue {
     return refused;
   }
 
-  /// The oldest item of the client whose turn it is: of the first for which `may_go(client, item)` holds of it.
+  /// The oldest item of the client whose turn it is: of the first for which `may_go(client, item)` holds of it. Takes
+  /// no memory, so that where that has ended what waits is served all the same.
   template <class MayGo>
   std::optional<Entry> pop_if(const MayGo& may_go) {
     for (std::size_t i = 0; i < turns_.size();) {
       const auto turn = turns_.begin() + static_cast<std::ptrdiff_t>(i);
-      const auto found = clients_.find(*turn);
+      const auto found = clients_.find(**turn);
       Waiting& waiting = found->second;
       if (waiting.items.empty()) {  // no memory was left for its first item
         clients_.erase(found);
         turns_.erase(turn);
         continue;
       }
-      if (!may_go(*turn, std::as_const(waiting.items.front().item))) {
+      if (!may_go(std::as_const(**turn), std::as_const(waiting.items.front().item))) {
         ++i;
         continue;
       }
@@ -144,8 +146,8 @@ class FairQueue {
 
   /// Else clients that are refused while nothing is taken out would add up.
   void forget_empty() {
-    std::erase_if(turns_, [this](const std::string& client) {
-      const auto found = clients_.find(client);
+    std::erase_if(turns_, [this](const std::shared_ptr<const std::string>& client) {
+      const auto found = clients_.find(*client);
       if (!found->second.items.empty()) return false;
       clients_.erase(found);
       return true;
@@ -172,7 +174,7 @@ class FairQueue {
 
   FairLimits limits_;
   std::map<std::string, Waiting> clients_;
-  std::deque<std::string> turns_;  // clients that have items
+  std::deque<std::shared_ptr<const std::string>> turns_;  // clients that have items
   std::size_t count_ = 0, bytes_ = 0;
 };
 

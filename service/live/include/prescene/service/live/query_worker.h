@@ -140,7 +140,7 @@ class QueryWorker {
   /// What one of the threads that simulate works on, and for whom.
   struct Simulating {
     Work work;
-    std::string client;
+    std::shared_ptr<const std::string> client;  // null where there is no work
   };
   /// Of a question that found no room.
   struct Refusal {
