@@ -46,10 +46,7 @@ void read_fields(const JsonAt& at, ExplainQuestion& question) {
       wanted->fail("an outcome's name or an outcome {...} is needed, not " + wanted->type());
     }
   }
-  if (const auto effort = fields.find("effort")) {
-    JsonObject limits(*effort);
-    question.max_seconds = read_number(limits, "max_seconds", kWallSeconds);
-  }
+  question.max_seconds = read_max_seconds(fields);
 }
 
 }  // namespace
@@ -63,12 +60,7 @@ core::Result<ExplainQuestion> explain_question_from_json(std::string_view json) 
 Json to_json(const ExplainQuestion& question) {
   Json asked = Json::object();
   if (!question.object.empty()) asked["object"] = question.object;
-  if (question.from && question.to) {
-    asked["from"] = *question.from;
-    asked["to"] = *question.to;
-  } else {
-    asked["last"] = question.last;
-  }
+  write_window({question.from, question.to, question.last}, asked);
   asked["frames"] = question.frames;
   asked["runs"] = question.runs;
   asked["points"] = question.points;
@@ -77,12 +69,7 @@ Json to_json(const ExplainQuestion& question) {
   if (question.change) asked["change"] = true;
   if (!question.wanted_name.empty()) asked["wanted"] = question.wanted_name;
   if (question.wanted) asked["wanted"] = to_json(*question.wanted);
-  if (question.max_seconds) asked["effort"] = {{"max_seconds", *question.max_seconds}};
-  Json json = Json::object();
-  if (!question.id.empty()) json["id"] = question.id;
-  if (question.stream) json["stream"] = true;
-  json["explain"] = std::move(asked);
-  return json;
+  return json_of_frames_question(question, "explain", std::move(asked));
 }
 
 }  // namespace prescene::belief

@@ -19,6 +19,22 @@ WindowFields read_window(const JsonAt& at, JsonObject& fields) {
   return window;
 }
 
+void write_window(const WindowFields& window, Json& asked) {
+  if (window.from && window.to) {
+    asked["from"] = *window.from;
+    asked["to"] = *window.to;
+  } else if (window.last) {
+    asked["last"] = *window.last;
+  }
+}
+
+std::optional<double> read_max_seconds(JsonObject& fields) {
+  const auto effort = fields.find("effort");
+  if (!effort) return std::nullopt;
+  JsonObject limits(*effort);
+  return read_number(limits, "max_seconds", kWallSeconds);
+}
+
 bool asks_of_frames(std::string_view json, std::string_view key) {
   // Looked for first, as most questions are others and need not be parsed twice. A backslash may write the key in
   // another way.

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON that questions about frames that were seen have in common: their window, and what is around their key.
+// JSON that questions about frames that were seen have in common: their window, their effort, and what is
+// around their key.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "json_values.h"
 #include "prescene/belief/json.h"
@@ -20,6 +22,9 @@ struct WindowFields {
 };
 /// `at`: the object of these fields, where an error about several of them is.
 WindowFields read_window(const JsonAt& at, JsonObject& fields);
+void write_window(const WindowFields& window, Json& asked);
+/// The key `effort`: wall time, s.
+std::optional<double> read_max_seconds(JsonObject& fields);
 /// Whether a text is a question about frames that were seen, with this key.
 bool asks_of_frames(std::string_view json, std::string_view key);
 /// Such a question: its `id` and `stream`, and what `read(JsonAt, Question&)` takes from its key.
@@ -41,6 +46,17 @@ core::Result<Question> question_of_frames(std::string_view json, const std::stri
   }
   if (!errors.ok()) return errors.status();
   return question;
+}
+
+/// What question_of_frames reads: `asked` under its key, with the effort.
+template <class Question>
+Json json_of_frames_question(const Question& question, const char* key, Json asked) {
+  if (question.max_seconds) asked["effort"] = {{"max_seconds", *question.max_seconds}};
+  Json json = Json::object();
+  if (!question.id.empty()) json["id"] = question.id;
+  if (question.stream) json["stream"] = true;
+  json[key] = std::move(asked);
+  return json;
 }
 
 }  // namespace prescene::belief

@@ -39,10 +39,7 @@ void read_why(const JsonAt& at, WhyQuestion& question) {
   question.to = window.to;
   question.last = window.last;
   if (const auto images = fields.find("images")) question.images = static_cast<int>(images->integer(0, kMostWhyImages));
-  if (const auto effort = fields.find("effort")) {
-    JsonObject limits(*effort);
-    question.max_seconds = read_number(limits, "max_seconds", kWallSeconds);
-  }
+  question.max_seconds = read_max_seconds(fields);
 }
 
 }  // namespace
@@ -73,19 +70,9 @@ Json to_json(const WhyQuestion& question) {
     asked["against"] = to_json(*question.X_WO);
   else if (question.against != WhyAgainst::kAbsenceAndAlternative)
     asked["against"] = name_of(question.against);
-  if (question.from && question.to) {
-    asked["from"] = *question.from;
-    asked["to"] = *question.to;
-  } else if (question.last) {
-    asked["last"] = *question.last;
-  }
+  write_window({question.from, question.to, question.last}, asked);
   asked["images"] = question.images;
-  if (question.max_seconds) asked["effort"] = {{"max_seconds", *question.max_seconds}};
-  Json json = Json::object();
-  if (!question.id.empty()) json["id"] = question.id;
-  if (question.stream) json["stream"] = true;
-  json["why"] = std::move(asked);
-  return json;
+  return json_of_frames_question(question, "why", std::move(asked));
 }
 
 }  // namespace prescene::belief
