@@ -70,10 +70,10 @@ core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene
 }
 
 /// The folder that `-o FOLDER/` names, while a simulation is recorded to its file. What is not finished goes.
-class NewBag {
+class SimulatedBag {
  public:
   /// Names the file in the options.
-  static core::Result<std::unique_ptr<NewBag>> create(RecordOptions& options) {
+  static core::Result<std::unique_ptr<SimulatedBag>> create(RecordOptions& options) {
     const std::filesystem::path folder = folder_of_bag(options.output);
     std::error_code error;
     const bool is_new = std::filesystem::create_directory(folder, error);
@@ -81,13 +81,13 @@ class NewBag {
     if (!is_new)
       return core::invalid_input("-o " + options.output + ": is there already; remove it, or name another folder");
     options.output = first_file_of_bag(folder).string();
-    return std::make_unique<NewBag>(options.output, options.simulation.topics.tf_static);
+    return std::make_unique<SimulatedBag>(options.output, options.simulation.topics.tf_static);
   }
-  NewBag(std::filesystem::path file, std::string tf_static)
+  SimulatedBag(std::filesystem::path file, std::string tf_static)
       : file_(std::move(file)), tf_static_(std::move(tf_static)) {}
-  NewBag(const NewBag&) = delete;
-  NewBag& operator=(const NewBag&) = delete;
-  ~NewBag() {
+  SimulatedBag(const SimulatedBag&) = delete;
+  SimulatedBag& operator=(const SimulatedBag&) = delete;
+  ~SimulatedBag() {
     std::error_code error;
     if (!is_finished_) std::filesystem::remove(file_.parent_path(), error);  // only if nothing is in it
   }
@@ -140,9 +140,9 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
       return core::invalid_input("--labels " + options.labels + ": is the recording's name; name a folder");
     PRESCENE_TRY(labels, BopDataset::create(options.labels, *scene, *renderer));
   }
-  std::unique_ptr<NewBag> bag;
+  std::unique_ptr<SimulatedBag> bag;
   if (names_bag(options.output)) {
-    PRESCENE_TRY(bag, NewBag::create(options));
+    PRESCENE_TRY(bag, SimulatedBag::create(options));
   }
   // An older recording of that name stays until this one is whole. Where there is none, what is done is kept.
   std::error_code error;
