@@ -10,6 +10,7 @@
 #include "prescene/filter/operators/standing.h"
 #include "prescene/filter/operators/track_state.h"
 #include "prescene/filter/operators/unknown_objects.h"
+#include "prescene/filter/operators/weight.h"
 #include "prescene/filter/proposals/fine_frame.h"
 #include "prescene/geometry/sampling.h"
 
@@ -30,7 +31,6 @@ constexpr SearchOptions kRecoverySearch = {.refine = {.steps = 10}, .polish_cand
 constexpr double kExplained = 0.015;    // m; measurements so near to a known surface are explained
 constexpr double kLeastShown = 0.08;    // share of the pixels in view that must not be hidden for a find to count ...
 constexpr double kLeastHits = 0.5;      // ... and share of those that must match
-constexpr double kMostOverlap = 0.25;   // share of a find that may be inside of a solid thing: its pose has errors, too
 constexpr double kInjectedShare = 0.5;  // of the particles are put at the find, the least probable ones
 constexpr int kHiddenDraws = 160;       // places that are tried for what may have gone where it cannot be seen
 constexpr double kFurthestFall = 0.3;   // m
@@ -173,12 +173,12 @@ bool recover(const FilterFrame& frame, const rendering::FrameTerms& terms, const
       return false;
   }
   // A support that is a little higher than the scene says looks like the top of something inside it.
-  if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > kMostOverlap) return false;
+  if (frame.surfaces->overlap(*target.mesh, X_WO, weighting.support_tolerance) > kMostInSupport) return false;
   // So does an arm that is not quite where it is said to be. But a hand of a coarse shape may hold a thing within it.
   const auto in_solids = [&](const Pose& pose) {
     return frame.solids.overlap(*target.mesh, pose, weighting.support_tolerance);
   };
-  if (in_solids(X_WO) > std::max(kMostOverlap, in_solids(last.X_WO))) return false;
+  if (in_solids(X_WO) > std::max(kMostInSupport, in_solids(last.X_WO))) return false;
   const auto as_find = [&](const Pose& at, const rendering::PoseEvidence& seen, double needed, Limit limit) {
     return evidence_of_find(at, seen, needed, limit, frame.density, terms, target, options, weighting, tools);
   };

@@ -12,8 +12,7 @@
 
 namespace prescene::filter {
 
-inline constexpr double kFewestRivalPixels = 12;       // the tempering's pixel count is at least this, as in weight()
-inline constexpr double kMostInSupportOfRival = 0.25;  // share of a turned pose; as of finds
+inline constexpr double kFewestRivalPixels = 12;  // the tempering's pixel count is at least this, as in weight()
 inline constexpr RefineOptions kRivalRefine = {.steps = 5, .first_gate = 0.03, .last_gate = 0.012};
 
 /// Whether the poses are turned against each other by kRivalTurn or more, up to symmetry.

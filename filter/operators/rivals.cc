@@ -50,7 +50,7 @@ std::vector<Rival> find_rivals(const FilterFrame& frame, const rendering::FrameT
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (share * (evidence[i].log_ratio - worth) < least_log_odds) continue;
     if (!is_apart(poses[i], X_WO.front(), symmetry)) continue;
-    if (frame.surfaces->overlap(*target.mesh, poses[i], weighting.support_tolerance) > kMostInSupportOfRival) continue;
+    if (frame.surfaces->overlap(*target.mesh, poses[i], weighting.support_tolerance) > kMostInSupport) continue;
     const double log_odds = share * (search.worth(evidence[i], poses[i]) - worth);
     if (log_odds >= least_log_odds)
       rivals.push_back({poses[i], search.covariance_at(poses[i], pixels, spread), log_odds});

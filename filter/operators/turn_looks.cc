@@ -116,7 +116,7 @@ TurnFits fits_in(const TurnLook& look, RivalSearch& coarse, RivalSearch& fine, c
     TurnFit fit{X_WO[i], evidence[i], fits.share * evidence[i].log_ratio, look.prior.log(X_WO[i])};
     if (odds) fit.log_stands = odds->log_of(X_WO[i]);
     if (i >= particles.size() &&
-        look.frame.surfaces->overlap(*look.target.mesh, X_WO[i], weighting.support_tolerance) > kMostInSupportOfRival)
+        look.frame.surfaces->overlap(*look.target.mesh, X_WO[i], weighting.support_tolerance) > kMostInSupport)
       fit.log_frame = kNoEvidence;
     fits.all.push_back(fit);
   }

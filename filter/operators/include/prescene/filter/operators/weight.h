@@ -52,8 +52,9 @@ struct ParticleWeight {
 
 inline constexpr double kSupportAround =
     2.5;  ///< Radii of an object; so far around it its support's height is measured.
-inline constexpr double kMostInSupport =
-    0.25;  ///< Share of a pose's overlap with a support that is no better than all.
+/// Share of an object that may be inside of something solid, as poses have errors, too: of what is found or turned, no
+/// more may be; of a particle, more counts as all.
+inline constexpr double kMostInSupport = 0.25;
 /// m; how deep the middle of a seen thing may be in a support: poses and supports are not known better, and the middle
 /// of what is thin is no higher above it than that.
 inline constexpr double kSunkAllowed = 0.005;
