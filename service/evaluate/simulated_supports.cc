@@ -6,24 +6,19 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 #include "prescene/core/random.h"
-#include "prescene/geometry/polygon.h"
-#include "prescene/geometry/primitives.h"
-#include "prescene/geometry/sampling.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
+#include "room_things.h"
+#include "simulated_room.h"
 #include "suite_camera.h"
 
 namespace prescene::service {
 namespace {
 
 using Eigen::Vector2d;
-using geometry::BoxShape;
 using geometry::Pose;
-using geometry::SymmetryGroup;
-using geometry::TriangleMesh;
 using geometry::Vector3d;
 
 constexpr double kHalfTurn = std::numbers::pi;
@@ -37,123 +32,13 @@ constexpr int kTries = 60;                // places tried for one thing
 constexpr std::array<geometry::Rgb, 7> kColors = {
     {{200, 60, 50}, {230, 225, 210}, {40, 80, 160}, {90, 70, 50}, {70, 140, 70}, {235, 190, 60}, {30, 30, 35}}};
 
-using Outline = std::vector<Vector2d>;
-
-/// A thing to place, and the ways in which it can lie.
-struct Kind {
-  std::string name;
-  TriangleMesh mesh;
-  geometry::Primitive solid;  // stands for it in simulations
-  std::vector<geometry::Quaterniond> lying;
-  bool flat_top = false;  // something may stand on it
-  SymmetryGroup symmetry{};
-};
-
-geometry::Quaterniond about(const Vector3d& axis, double angle) { return geometry::exp_rotation(angle * axis); }
-
-std::vector<geometry::Quaterniond> upright_or_on_its_side() {
-  return {geometry::Quaterniond::Identity(), about(Vector3d::UnitX(), 0.5 * kHalfTurn)};
-}
-
-std::vector<geometry::Quaterniond> on_any_face() {
-  return {geometry::Quaterniond::Identity(), about(Vector3d::UnitX(), 0.5 * kHalfTurn),
-          about(Vector3d::UnitY(), 0.5 * kHalfTurn)};
-}
-
-Kind box_kind(const std::string& name, const Vector3d& size) {
-  return {name, geometry::make_mesh(BoxShape{size}), BoxShape{size}, on_any_face(), true, SymmetryGroup::cuboid()};
-}
-
-Kind can_kind(const std::string& name, double radius, double length) {
-  const geometry::Cylinder cylinder{radius, length};
-  return {name,     geometry::make_mesh(cylinder, 24),
-          cylinder, upright_or_on_its_side(),
-          false,    SymmetryGroup::continuous(Vector3d::UnitZ(), true)};
-}
-
-Kind mug_kind() {
-  TriangleMesh mesh =
-      geometry::make_lathe({{0.0, 0.0}, {0.040, 0.0}, {0.041, 0.09}, {0.037, 0.09}, {0.036, 0.005}, {0.0, 0.005}}, 24);
-  const auto bar = [&](const Vector3d& size, const Vector3d& middle) {
-    mesh = geometry::joined(mesh,
-                            geometry::transformed(geometry::make_mesh(BoxShape{size}), Pose::from_translation(middle)));
-  };
-  bar({0.030, 0.012, 0.010}, {0.054, 0.0, 0.070});
-  bar({0.030, 0.012, 0.010}, {0.054, 0.0, 0.025});
-  bar({0.010, 0.012, 0.055}, {0.066, 0.0, 0.0475});
-  return {"mug",
-          mesh,
-          geometry::Cylinder{0.041, 0.09},
-          {geometry::Quaterniond::Identity(), about(Vector3d::UnitX(), kHalfTurn)},
-          false};
-}
-
-std::vector<Kind> object_kinds() {
-  return {
-      box_kind("cereal", {0.06, 0.16, 0.21}),
-      box_kind("tea_box", {0.07, 0.075, 0.13}),
-      box_kind("brick", {0.10, 0.20, 0.065}),
-      can_kind("can", 0.034, 0.102),
-      can_kind("tin", 0.051, 0.139),
-      {"bottle",
-       geometry::make_lathe({{0.0, 0.0}, {0.035, 0.0}, {0.035, 0.13}, {0.014, 0.18}, {0.014, 0.21}, {0.0, 0.21}}, 24),
-       geometry::Cylinder{0.035, 0.21}, upright_or_on_its_side(), false,
-       SymmetryGroup::continuous(Vector3d::UnitZ(), false)},
-      {"carton", geometry::make_gable_carton(0.07, 0.07, 0.19, 0.23), BoxShape{{0.07, 0.07, 0.23}}, on_any_face(),
-       false, SymmetryGroup::cyclic(Vector3d::UnitZ(), 2)},
-      mug_kind(),
-      {"bowl",
-       geometry::make_lathe({{0.0, 0.0}, {0.035, 0.0}, {0.080, 0.055}, {0.076, 0.055}, {0.033, 0.005}, {0.0, 0.005}},
-                            24),
-       geometry::Cylinder{0.08, 0.055},
-       {geometry::Quaterniond::Identity()},
-       false,
-       SymmetryGroup::continuous(Vector3d::UnitZ(), false)},
-      {"ball",
-       geometry::make_mesh(geometry::Sphere{0.045}, 24),
-       geometry::Sphere{0.045},
-       {geometry::Quaterniond::Identity()},
-       false,
-       SymmetryGroup::every_rotation()}};
-}
-
-/// Something nobody knows of: a box or a cylinder.
-Kind unknown_kind(core::RandomStream& draws) {
-  if (draws.uniform() < 0.6) {
-    const double x = draws.uniform(0.04, 0.14), y = draws.uniform(0.04, 0.14), z = draws.uniform(0.04, 0.18);
-    return box_kind("unknown box", {x, y, z});
-  }
-  const double radius = draws.uniform(0.02, 0.06), length = draws.uniform(0.05, 0.20);
-  return can_kind("unknown can", radius, length);
-}
-
-/// A level rectangle that things can stand on.
-struct Place {
-  std::string name;
-  Pose X_WP;  // at its middle, z up
-  Vector2d half = Vector2d::Zero();
-  double headroom = std::numeric_limits<double>::infinity();
-};
-
-struct Furniture {
-  belief::Support support;
-  std::vector<Place> places;
-  Outline outline;  // on the ground; empty for the floor, which is under everything
-};
-
 struct Placed {
-  Kind kind;
+  ThingKind kind;
   Pose X_WO;
   Outline outline;
   double low = 0.0, high = 0.0;
   std::string stands_on;
 };
-
-Outline outline_of(const TriangleMesh& mesh, const Pose& X_WM) {
-  Outline points;
-  for (const Vector3d& vertex : mesh.vertices) points.push_back((X_WM * vertex).head<2>());
-  return geometry::convex_polygon(std::move(points));
-}
 
 /// Whether two convex outlines come nearer to each other than kGap (along the axes that separate convex polygons).
 bool touch(const Outline& a, const Outline& b) {
@@ -171,104 +56,6 @@ bool touch(const Outline& a, const Outline& b) {
   return !apart(a, a, b) && !apart(b, a, b);
 }
 
-belief::PrimitiveShape part(const Vector3d& size, const Vector3d& middle) {
-  return {BoxShape{size}, Pose::from_translation(middle)};
-}
-
-/// Furniture stands with the middle of its base at the support's origin.
-Furniture block(const std::string& name, const Vector2d& size, double height) {
-  Furniture made;
-  made.support.name = name;
-  made.support.collision.push_back(part({size.x(), size.y(), height}, {0.0, 0.0, 0.5 * height}));
-  made.places.push_back({name, Pose::from_translation({0.0, 0.0, height}), 0.5 * size});
-  return made;
-}
-
-Furniture table(const std::string& name, const Vector2d& size, double height) {
-  constexpr double kTop = 0.03, kLeg = 0.04;
-  Furniture made;
-  made.support.name = name;
-  made.support.collision.push_back(part({size.x(), size.y(), kTop}, {0.0, 0.0, height - 0.5 * kTop}));
-  for (const double x : {-1.0, 1.0})
-    for (const double y : {-1.0, 1.0})
-      made.support.collision.push_back(
-          part({kLeg, kLeg, height - kTop},
-               {0.5 * x * (size.x() - kLeg), 0.5 * y * (size.y() - kLeg), 0.5 * (height - kTop)}));
-  made.places.push_back({name, Pose::from_translation({0.0, 0.0, height}), 0.5 * size});
-  return made;
-}
-
-Furniture shelf(const std::string& name, const Vector2d& size, double low, double high) {
-  constexpr double kBoard = 0.02;
-  Furniture made;
-  made.support.name = name;
-  for (const double top : {low, high}) {
-    made.support.collision.push_back(part({size.x(), size.y(), kBoard}, {0.0, 0.0, top - 0.5 * kBoard}));
-    made.places.push_back({name + (top == low ? " (lower board)" : " (upper board)"),
-                           Pose::from_translation({0.0, 0.0, top}), 0.5 * size - Vector2d(2.0 * kBoard, 0.0)});
-  }
-  made.places[0].headroom = high - kBoard - low - 0.01;
-  for (const double x : {-1.0, 1.0})
-    made.support.collision.push_back(
-        part({kBoard, size.y(), high - kBoard}, {0.5 * x * (size.x() - kBoard), 0.0, 0.5 * (high - kBoard)}));
-  return made;
-}
-
-/// The room: floor (perhaps), furniture in a row, a wall behind it (perhaps).
-struct Room {
-  std::vector<Furniture> furniture;
-  std::optional<TriangleMesh> wall;
-  bool has_floor = false;
-  int supports = 0;
-  double middle_height = 0.0;
-};
-
-Room furnish(core::RandomStream& draws) {
-  Room room;
-  const int wanted = 2 + static_cast<int>(draws.uniform_below(3));
-  room.has_floor = draws.uniform() < 0.6;
-  room.supports = room.has_floor ? 1 : 0;
-  std::vector<Furniture> row;
-  while (room.supports < wanted) {
-    const Vector2d size(draws.uniform(0.35, 0.55), draws.uniform(0.30, 0.50));
-    const double height = draws.uniform(0.12, 0.75);
-    const double kind = draws.uniform();
-    const std::string number = std::to_string(row.size() + 1);
-    if (kind < 0.25 && room.supports + 2 <= wanted) {
-      const double low = draws.uniform(0.10, 0.35);
-      row.push_back(shelf("shelf_" + number, size, low, low + draws.uniform(0.34, 0.45)));
-    } else if (kind < 0.6) {
-      row.push_back(table("table_" + number, size, std::max(0.3, height)));
-    } else {
-      row.push_back(block("block_" + number, size, height));
-    }
-    room.supports += static_cast<int>(row.back().places.size());
-  }
-  for (std::size_t i = 0; i < row.size(); ++i) {
-    const double x = 0.65 * (static_cast<double>(i) - 0.5 * static_cast<double>(row.size() - 1));
-    const Pose X_WS{about(Vector3d::UnitZ(), draws.uniform(-0.2, 0.2)), {x, draws.uniform(-0.12, 0.12), 0.0}};
-    Furniture& one = row[i];
-    one.support.X_WS = X_WS;
-    one.outline = outline_of(belief::collision_mesh(one.support.collision), X_WS);
-    for (Place& place : one.places) {
-      place.X_WP = X_WS * place.X_WP;
-      room.middle_height += place.X_WP.translation.z() / room.supports;
-    }
-    room.furniture.push_back(std::move(one));
-  }
-  if (room.has_floor) {
-    Furniture floor;
-    floor.support.name = "floor";
-    floor.support.collision.push_back(part({6.0, 6.0, 0.1}, {0.0, 0.0, -0.05}));
-    floor.places.push_back({"floor", Pose::from_translation({0.0, -0.35, 0.0}), {0.9, 0.6}});
-    room.furniture.push_back(std::move(floor));
-  }
-  if (draws.uniform() < 0.3)
-    room.wall = geometry::transformed(geometry::make_mesh(BoxShape{{6.0, 0.1, 4.0}}),
-                                      Pose::from_translation({0.0, draws.uniform(0.45, 0.7), 1.0}));
-  return room;
-}
-
 bool is_in_view(const geometry::PinholeCamera& camera, const Vector3d& p_CQ) {
   if (!(p_CQ.z() > 0.0)) return false;
   const Vector2d pixel = camera.project(p_CQ);
@@ -284,9 +71,9 @@ class Layout {
 
   /// Puts the thing at a random free place in view of a random support, or in every sixth case on something with a flat
   /// top.
-  bool put(const Kind& kind, core::RandomStream& draws) {
+  bool put(const ThingKind& kind, core::RandomStream& draws) {
     for (int attempt = 0; attempt < kTries; ++attempt) {
-      const Place place = draws.uniform() < 1.0 / 6.0 ? top_of_a_thing(draws) : any_place(draws);
+      const RoomPlace place = draws.uniform() < 1.0 / 6.0 ? top_of_a_thing(draws) : any_place(draws);
       const Vector2d at(draws.uniform(-place.half.x(), place.half.x()), draws.uniform(-place.half.y(), place.half.y()));
       const bool on_thing = place.name.rfind("on ", 0) == 0;
       if (put_at(kind, place, at, on_thing, draws)) return true;
@@ -295,11 +82,11 @@ class Layout {
   }
 
   /// Puts the thing between the camera and one that is there already.
-  bool put_before(const Kind& kind, const Vector3d& p_WC, core::RandomStream& draws) {
+  bool put_before(const ThingKind& kind, const Vector3d& p_WC, core::RandomStream& draws) {
     if (things_.empty()) return false;
     const Placed& hidden = things_[draws.uniform_below(things_.size())];
     for (const Furniture& one : room_.furniture)
-      for (const Place& place : one.places) {
+      for (const RoomPlace& place : one.places) {
         if (place.name != hidden.stands_on) continue;
         const Vector2d towards = (p_WC - hidden.X_WO.translation).head<2>().normalized();
         const Vector2d aside(-towards.y(), towards.x());
@@ -314,14 +101,14 @@ class Layout {
   }
 
  private:
-  Place any_place(core::RandomStream& draws) const {
-    std::vector<const Place*> places;
+  RoomPlace any_place(core::RandomStream& draws) const {
+    std::vector<const RoomPlace*> places;
     for (const Furniture& one : room_.furniture)
-      for (const Place& place : one.places) places.push_back(&place);
+      for (const RoomPlace& place : one.places) places.push_back(&place);
     return *places[draws.uniform_below(places.size())];
   }
 
-  Place top_of_a_thing(core::RandomStream& draws) const {
+  RoomPlace top_of_a_thing(core::RandomStream& draws) const {
     std::vector<const Placed*> flat;
     for (const Placed& thing : things_)
       if (thing.kind.flat_top) flat.push_back(&thing);
@@ -332,11 +119,12 @@ class Layout {
             {0.015, 0.015}};
   }
 
-  bool put_at(const Kind& kind, const Place& place, const Vector2d& at, bool overhanging, core::RandomStream& draws) {
+  bool put_at(const ThingKind& kind, const RoomPlace& place, const Vector2d& at, bool overhanging,
+              core::RandomStream& draws) {
     Placed placed;
     placed.kind = kind;
     placed.stands_on = place.name;
-    placed.X_WO.rotation = (about(Vector3d::UnitZ(), draws.uniform(-kHalfTurn, kHalfTurn)) *
+    placed.X_WO.rotation = (geometry::exp_rotation(draws.uniform(-kHalfTurn, kHalfTurn) * Vector3d::UnitZ()) *
                             kind.lying[draws.uniform_below(kind.lying.size())])
                                .normalized();
     geometry::Box box;
@@ -358,7 +146,7 @@ class Layout {
         return false;
     for (const Furniture& one : room_.furniture) {
       const bool own =
-          std::any_of(one.places.begin(), one.places.end(), [&](const Place& p) { return p.name == place.name; });
+          std::any_of(one.places.begin(), one.places.end(), [&](const RoomPlace& p) { return p.name == place.name; });
       if (!own && !one.outline.empty() && placed.low < one.places.back().X_WP.translation.z() &&
           touch(placed.outline, one.outline))
         return false;
@@ -392,22 +180,12 @@ int pixels_of(const geometry::LabelImage& labels, std::size_t instance) {
       std::count(labels.data(), labels.data() + labels.size(), static_cast<std::uint16_t>(1 + instance)));
 }
 
-core::Result<belief::ObjectModel> model_of(const Kind& kind) {
-  belief::ObjectModel model;
-  model.name = kind.name;
-  model.collision.push_back(
-      belief::PrimitiveShape{kind.solid, Pose::from_translation(geometry::bounding_box(kind.mesh).center())});
-  model.visual = std::make_shared<const TriangleMesh>(kind.mesh);
-  model.symmetry = kind.symmetry;
-  return belief::with_derived_properties(std::move(model));
-}
-
 }  // namespace
 
 core::Result<belief::Scene> room_models() {
   belief::Scene scene;
   scene.name = "rooms";
-  for (const Kind& kind : object_kinds()) {
+  for (const ThingKind& kind : known_things()) {
     PRESCENE_TRY(belief::ObjectModel model, model_of(kind));
     scene.models.push_back(std::move(model));
   }
@@ -431,7 +209,7 @@ core::Result<SupportsFrame> simulate_supports(std::uint64_t number, rendering::R
   const geometry::PinholeCamera& camera = frame.observation.frame.camera;
   const Pose& X_WC = frame.observation.X_WC;
   Layout layout(room, camera, X_WC);
-  std::vector<Kind> kinds = object_kinds();
+  std::vector<ThingKind> kinds = known_things();
   const int wanted = 3 + static_cast<int>(draws.uniform_below(6));
   std::vector<std::size_t> objects, others;  // indices of things
   for (int i = 0; i < wanted; ++i) {
@@ -441,7 +219,7 @@ core::Result<SupportsFrame> simulate_supports(std::uint64_t number, rendering::R
   }
   const int unknown = 1 + static_cast<int>(draws.uniform_below(3));
   for (int i = 0; i < unknown; ++i) {
-    const Kind kind = unknown_kind(draws);
+    const ThingKind kind = unknown_thing(draws);
     const bool before = draws.uniform() < 0.6;
     if (before ? layout.put_before(kind, p_WC, draws) : layout.put(kind, draws))
       others.push_back(layout.things().size() - 1);
