@@ -2,16 +2,13 @@
 #include "prescene/simulation/outcomes/outcome_estimator.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numeric>
-#include <utility>
+#include <optional>
 
-#include "instance_classes.h"
+#include "audited_runs.h"
+#include "estimate_forecast.h"
 #include "instance_plan.h"
 #include "prescene/core/check.h"
 #include "prescene/core/clock.h"
-#include "prescene/core/text.h"
 #include "prescene/simulation/rules/action_draws.h"
 
 namespace prescene::simulation {
@@ -19,7 +16,6 @@ namespace {
 
 // Chunks that are done sooner than this (s) are made larger: simulators may do many at once for less.
 constexpr double kShortChunk = 0.02;
-constexpr double kJudgedAfterCancelling = 0.1;  // s, at most, in which finished runs are still judged
 constexpr std::size_t kLargestChunk = 1024;
 
 /// Instances run between two looks at the clock, at first. Does not change results.
@@ -33,195 +29,6 @@ std::size_t largest_chunk(const StartDistribution& starts, const std::vector<Sta
   if (!(request.sample_interval > 0.0) || starts.components.empty()) return kLargestChunk;
   const std::size_t objects = samplers.front().draw(0).objects.size();
   return std::clamp<std::size_t>(bytes / bytes_of_run(request, objects), 1, kLargestChunk);
-}
-
-/// Forecasts how many instances the stop rule will take, from how the widest interval shrank so far.
-class Forecast {
- public:
-  Forecast(const EstimatorOptions& options, core::ProgressSink sink) : options_(options), sink_(std::move(sink)) {
-    expected_ = options.exact_instances ? *options.exact_instances : options.max_instances;
-  }
-
-  void stage_done(double count, double widest, std::string settled) {
-    settled_ = std::move(settled);
-    if (options_.exact_instances) return;
-    // Between the rates of independent draws (1/2) and of nets in smooth problems (1); 0.6 until two stages are known.
-    double rate = 0.6;
-    if (!std::isfinite(widest)) {
-      expected_ = options_.max_instances;
-      return;
-    }
-    if (first_count_ == 0.0) {
-      first_count_ = count;
-      first_widest_ = widest;
-    } else if (widest > 0.0 && count > first_count_) {
-      rate = std::clamp(std::log(first_widest_ / widest) / std::log(count / first_count_), 0.5, 1.0);
-    }
-    const double wanted = count * std::pow(std::max(1.0, widest / options_.tolerance), 1.0 / rate);
-    const double limit = options_.max_instances;
-    // Of an interval without end nothing can be forecast; `wanted` is no number then.
-    expected_ =
-        wanted < limit ? std::min(limit, static_cast<double>(next_net_size(static_cast<int>(wanted) - 1))) : limit;
-  }
-
-  void report(double done) {
-    if (!sink_) return;
-    const double elapsed = watch_.seconds();
-    const double total = std::max(done, expected_);
-    double left = done > 0.0 ? elapsed * (total - done) / done : 0.0;
-    double fraction = done / total;
-    if (options_.max_seconds && *options_.max_seconds < elapsed + left) {
-      left = std::max(0.0, *options_.max_seconds - elapsed);
-      fraction = std::max(fraction, elapsed / (elapsed + left));
-    }
-    shown_ = std::clamp(fraction, shown_, 1.0);  // a bar never runs backwards
-    sink_({shown_, left,
-           std::to_string(static_cast<int>(done)) + " of about " + std::to_string(static_cast<int>(total)) +
-               " instances" + settled_});
-  }
-
- private:
-  EstimatorOptions options_;
-  core::ProgressSink sink_;
-  core::Stopwatch watch_;
-  double expected_;
-  double first_count_ = 0.0, first_widest_ = 0.0;
-  double shown_ = 0.0;
-  std::string settled_;
-};
-
-/// All that running instances takes.
-struct Runner {
-  const Simulator& simulator;
-  std::span<const Variable> variables;
-  RunRequest request;
-  const core::RandomStream& stream;
-  core::ThreadPool& pool;
-  const core::Cancellation* cancellation;
-  const std::vector<StartSampler>& samplers;
-  const Certifier* certifier;  // null: run all to rest
-  double audit_share;
-  bool keep_contacts;
-};
-
-void note_run(const Runner& runner, belief::Trajectory& run, InstanceRecord& record) {
-  record.classes = classes_of(run, runner.variables, runner.certifier, runner.request.stop.duration);
-  record.certified = run.end == belief::TrajectoryEnd::kDecided;
-  record.failed = run.end == belief::TrajectoryEnd::kDiverged;
-  record.final = std::move(run.states.back());
-  record.end = run.end;
-  record.deepest_overlap = std::max(record.deepest_overlap, run.deepest_overlap);
-  record.dropped_contacts = std::max(record.dropped_contacts, run.dropped_contacts);
-  if (runner.keep_contacts) record.contacts = std::move(run.contacts);
-  record.simulated_seconds += run.simulated_seconds;
-  record.flown_seconds += run.flown_seconds;
-}
-
-/// Runs the instances of these numbers to rest and replaces their records; returns how many, in order, were not
-/// cancelled. `changed` gets those whose classes change.
-std::size_t run_to_rest(const Runner& runner, std::span<const std::uint32_t> numbers,
-                        std::vector<InstanceRecord>& records, std::vector<std::uint32_t>& changed) {
-  RunRequest request = runner.request;
-  request.end_rule = nullptr;
-  std::vector<belief::WorldState> starts;
-  for (const std::uint32_t number : numbers)
-    starts.push_back(runner.samplers[static_cast<std::size_t>(records[number].component)].draw(records[number].point));
-  std::vector<belief::Trajectory> runs(numbers.size());
-  runner.simulator.run(starts, request, runner.stream, numbers, runner.pool, runs, runner.cancellation);
-  for (std::size_t n = 0; n < numbers.size(); ++n) {
-    if (runs[n].end == belief::TrajectoryEnd::kCancelled) return n;
-    InstanceRecord& record = records[numbers[n]];
-    const std::vector<int> before = record.classes;
-    note_run(runner, runs[n], record);
-    if (record.classes != before) changed.push_back(numbers[n]);
-  }
-  return numbers.size();
-}
-
-/// Numbers of the instances that ended by a certificate, ascending.
-struct AuditTrail {
-  std::vector<std::uint32_t> certified, audited, mismatched;
-
-  /// Of the first `count` instances, whatever became of the others.
-  CertificateUse use_of(std::size_t count) const {
-    const auto below = [&](const std::vector<std::uint32_t>& numbers) {
-      return static_cast<int>(std::ranges::lower_bound(numbers, count) - numbers.begin());
-    };
-    return {below(certified), below(audited), below(mismatched), false};
-  }
-  bool fails(std::size_t count, double tolerated) const {
-    const CertificateUse use = use_of(count);
-    return use.mismatches > tolerated * use.audited;
-  }
-};
-
-/// Runs `planned` (numbers first, first + 1, ... of the order) and appends the records of those that were finished
-/// before any that was cancelled. Returns false when one was.
-bool run_chunk(const Runner& runner, std::span<const PlannedInstance> planned, std::vector<InstanceRecord>& records,
-               AuditTrail& trail) {
-  const std::size_t first = records.size();
-  std::vector<belief::WorldState> starts(planned.size());
-  runner.pool.for_each_index(planned.size(), [&](std::size_t i) {
-    starts[i] = runner.samplers[static_cast<std::size_t>(planned[i].component)].draw(planned[i].point);
-  });
-  std::vector<belief::Trajectory> runs(planned.size());
-  RunRequest request = runner.request;
-  request.end_rule = runner.certifier;
-  runner.simulator.run(starts, request, runner.stream, static_cast<std::uint32_t>(first), runner.pool, runs,
-                       runner.cancellation);
-
-  std::size_t finished = 0;
-  while (finished < runs.size() && runs[finished].end != belief::TrajectoryEnd::kCancelled) ++finished;
-  records.resize(first + finished);
-  // What was cancelled in its runs keeps those that were finished; but judging many outcomes over many states takes its
-  // time too, and whoever cancels does not wait for long.
-  std::vector<std::uint8_t> noted(finished, 0);
-  const core::Stopwatch judging;
-  runner.pool.for_each_index(finished, [&](std::size_t i) {
-    if (runner.cancellation && judging.seconds() > kJudgedAfterCancelling && runner.cancellation->requested()) return;
-    InstanceRecord& record = records[first + i];
-    record.component = planned[i].component;
-    record.point = planned[i].point;
-    note_run(runner, runs[i], record);
-    noted[i] = 1;
-  });
-  finished = static_cast<std::size_t>(std::find(noted.begin(), noted.end(), 0) - noted.begin());
-  records.resize(first + finished);
-  std::vector<std::uint32_t> audited;
-  for (auto n = static_cast<std::uint32_t>(first); n < first + finished; ++n) {
-    if (!records[n].certified) continue;
-    trail.certified.push_back(n);
-    core::RandomStream draw = runner.stream.for_purpose(core::Purpose::kAudit).at(0, n);
-    if (draw.uniform() < runner.audit_share) audited.push_back(n);
-  }
-  const std::size_t done = run_to_rest(runner, audited, records, trail.mismatched);
-  trail.audited.insert(trail.audited.end(), audited.begin(), audited.begin() + static_cast<std::ptrdiff_t>(done));
-  if (done < audited.size()) records.resize(audited[done]);
-  return finished == runs.size() && done == audited.size();
-}
-
-/// Runs to rest what ended by its certificate; returns whether certificates count for nothing then. Cancelled on the
-/// way, it cuts to the instances that were repaired, or to those of which the audit had not failed, if those are more:
-/// a replay of so many comes to the same.
-bool repair(const Runner& runner, const AuditTrail& trail, double tolerated, std::vector<InstanceRecord>& records,
-            bool& cancelled) {
-  std::vector<InstanceRecord> repaired = records;
-  std::vector<std::uint32_t> numbers, changed;
-  for (std::uint32_t n = 0; n < records.size(); ++n)
-    if (records[n].certified) numbers.push_back(n);
-  const std::size_t done = run_to_rest(runner, numbers, repaired, changed);
-  cancelled = done < numbers.size();
-  if (cancelled) {
-    repaired.resize(numbers[done]);
-    std::size_t sound = records.size();
-    while (trail.fails(sound, tolerated)) --sound;
-    if (sound >= repaired.size()) {
-      records.resize(sound);
-      return false;
-    }
-  }
-  records = std::move(repaired);
-  return true;
 }
 
 /// Of each instance; they sum to one.
@@ -341,30 +148,6 @@ class Looks {
   int looks_ = 0;  // but for the first of kEarly
 };
 
-double widest_half(const OutcomeEstimate& estimate) {
-  double widest = 0.0;
-  for (const VariableEstimate& variable : estimate.variables)
-    for (const ClassEstimate& one : variable.classes)
-      widest = std::isnan(one.half_width) ? std::numeric_limits<double>::infinity() : std::max(widest, one.half_width);
-  return widest;
-}
-
-/// The likeliest classes of the first variable, for progress: ", in_bin 0.62 +-0.03, ...".
-std::string settled_text(std::span<const Variable> variables, const OutcomeEstimate& estimate) {
-  constexpr std::size_t kShown = 3;
-  if (estimate.variables.empty()) return {};
-  const std::vector<ClassEstimate>& classes = estimate.variables[0].classes;
-  std::vector<std::size_t> order(variables[0].name.empty() ? 1 : classes.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return classes[a].probability > classes[b].probability; });
-  std::string text;
-  for (std::size_t c : std::span(order).first(std::min(kShown, order.size())))
-    text += ", " + variables[0].classes[c] + " " + core::fixed_text(classes[c].probability, 2) + " +-" +
-            core::fixed_text(classes[c].half_width, 2);
-  return text;
-}
-
 }  // namespace
 
 std::string to_string(EstimateStop stop) {
@@ -409,21 +192,21 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
   PRESCENE_CHECK(options.audit_share >= 0.0 && options.audit_share <= 1.0);
   OutcomeEstimate estimate;
   AuditTrail trail;
-  Runner runner{simulator,
-                variables,
-                request,
-                stream,
-                pool,
-                cancellation,
-                samplers,
-                options.certifier,
-                options.audit_share,
-                options.keep_contacts};
+  InstanceRunner runner{simulator,
+                        variables,
+                        request,
+                        stream,
+                        pool,
+                        cancellation,
+                        samplers,
+                        options.certifier,
+                        options.audit_share,
+                        options.keep_contacts};
   estimate.certain = action_dimensions(request.actions) == 0 &&
                      std::all_of(starts.components.begin(), starts.components.end(),
                                  [](const StartComponent& component) { return component.dimensions == 0; }) &&
                      starts.components.size() <= limit;
-  Forecast forecast(options, progress);
+  EstimateForecast forecast(options, progress);
   Looks looks(starts, variables, options);
   const std::size_t most_at_once = largest_chunk(starts, samplers, request, options.bytes_of_runs);
   std::size_t chunk = std::min(chunk_size(pool), most_at_once);
@@ -457,7 +240,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
     bool switched_off = estimate.certificates.switched_off;
     if (runner.certifier && trail.fails(estimate.instances.size(), options.tolerated_mismatch)) {
       bool cancelled = false;
-      switched_off = repair(runner, trail, options.tolerated_mismatch, estimate.instances, cancelled);
+      switched_off = repair_certified(runner, trail, options.tolerated_mismatch, estimate.instances, cancelled);
       if (cancelled) stop = EstimateStop::kCancelled;
       runner.certifier = nullptr;
     }
@@ -471,8 +254,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
       estimate.history.push_back({static_cast<int>(estimate.instances.size()), estimate.variables});
       looks.tell(estimate, watch.seconds());
     }
-    forecast.stage_done(static_cast<double>(estimate.instances.size()), widest_half(estimate),
-                        settled_text(variables, estimate));
+    forecast.stage_done(variables, estimate);
     // Whoever gave a time may also cancel when it is over.
     if (stop == EstimateStop::kCancelled && options.max_seconds && watch.seconds() >= *options.max_seconds)
       stop = EstimateStop::kTimeLimit;
