@@ -32,6 +32,11 @@ struct ObjectSlot {
 };
 using SlotState = std::vector<ObjectSlot>;  // by object
 
+/// What the rows hold of a place.
+inline Vector3d vector_at(const Rows<3>& rows, int at) {
+  return {static_cast<double>(rows[0][at]), static_cast<double>(rows[1][at]), static_cast<double>(rows[2][at])};
+}
+
 class LaneEngine {
  public:
   LaneEngine(std::shared_ptr<const CompiledLockstep> scene, int slots);

@@ -12,9 +12,6 @@ namespace {
 Vector3d vector_of(const Real (&v)[3]) {
   return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
 }
-Vector3d row_at(const Rows<3>& rows, int at) {
-  return {static_cast<double>(rows[0][at]), static_cast<double>(rows[1][at]), static_cast<double>(rows[2][at])};
-}
 
 }  // namespace
 
@@ -36,7 +33,7 @@ int LaneEngine::parts_to_impact(int slot, int left) {
     const auto contacts = found(slot, object);
     if (contacts.empty()) continue;
     const geometry::Matrix3d R = rotation(slot, object).toRotationMatrix();
-    const Vector3d v = row_at(state_.v, at), w = row_at(state_.w, at);
+    const Vector3d v = vector_at(state_.v, at), w = vector_at(state_.w, at);
     const double reach = scene_->lanes.bodies[static_cast<std::size_t>(object)].radius;
     for (const LaneContact& c : contacts) {
       const Vector3d normal = R * vector_of(c.normal);
@@ -46,8 +43,8 @@ int LaneEngine::parts_to_impact(int slot, int left) {
       const int other = scene_->lanes.parts[static_cast<std::size_t>(c.part)].body;
       if (other >= 0 && other < objects()) {
         const int at_other = state_.at(other, slot);
-        const Vector3d other_arm = row_at(state_.p, at) + arm - row_at(state_.p, at_other);
-        speed -= normal.dot(row_at(state_.v, at_other) + row_at(state_.w, at_other).cross(other_arm));
+        const Vector3d other_arm = vector_at(state_.p, at) + arm - vector_at(state_.p, at_other);
+        speed -= normal.dot(vector_at(state_.v, at_other) + vector_at(state_.w, at_other).cross(other_arm));
         acceleration = 0.0;
       }
       first = std::min(first, split_time({static_cast<double>(c.gap), speed, acceleration, reach}, scene_->options));
