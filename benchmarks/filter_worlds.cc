@@ -11,6 +11,7 @@
 #include "prescene/core/order_statistics.h"
 #include "prescene/filter/particle_filter.h"
 #include "prescene/geometry/dense_solvers.h"
+#include "prescene/geometry/level_camera.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/symmetry.h"
 #include "prescene/rendering/reference/reference_renderer.h"
@@ -142,11 +143,8 @@ Contacts contacts_of(const std::string& kind, std::uint64_t seed) {
     const Vector3d from(between(-0.015, 0.015), -0.12, 0.04);
     add_pusher(contacts, from, from + Vector3d(0, speed * (end - begin), 0), begin, end);
   }
-  geometry::Matrix3d R_WC;
-  R_WC.col(2) = look;
-  R_WC.col(0) = look.cross(Vector3d::UnitZ()).normalized();
-  R_WC.col(1) = R_WC.col(2).cross(R_WC.col(0));
-  contacts.X_WC = {geometry::Quaterniond(R_WC), Vector3d(0, 0.05, 0.06) - between(0.7, 0.9) * look};
+  contacts.X_WC = {geometry::Quaterniond(geometry::level_camera(look)),
+                   Vector3d(0, 0.05, 0.06) - between(0.7, 0.9) * look};
   return contacts;
 }
 

@@ -2,6 +2,7 @@
 // The camera of simulated evaluations, and where it looks.
 #pragma once
 
+#include "prescene/geometry/level_camera.h"
 #include "prescene/service/recording/simulated_recording.h"
 
 namespace prescene::service {
@@ -23,11 +24,7 @@ inline void set_suite_camera(SimulatedRecordingOptions& options) {
 /// X_WC of a camera at `eye` that looks at `target`, its image upright in a world with z up. The line of sight must not
 /// be vertical.
 inline geometry::Pose looking_at(const geometry::Vector3d& eye, const geometry::Vector3d& target) {
-  geometry::Matrix3d R;
-  R.col(2) = (target - eye).normalized();
-  R.col(0) = R.col(2).cross(geometry::Vector3d::UnitZ()).normalized();
-  R.col(1) = R.col(2).cross(R.col(0));
-  return {geometry::Quaterniond(R), eye};
+  return {geometry::Quaterniond(geometry::level_camera((target - eye).normalized())), eye};
 }
 
 }  // namespace prescene::service

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "prescene/core/text.h"
+#include "prescene/geometry/level_camera.h"
 #include "prescene/interfaces/reports/report.h"
 #include "prescene/rendering/reference/reference_renderer.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
@@ -37,12 +38,8 @@ core::Result<geometry::ColorImage> mesh_picture(const rendering::MeshHandle& mes
                                                 double radius, const geometry::Vector3d& p_BoC) {
   const auto renderer = rendering::make_reference_renderer();
   const geometry::PinholeCamera camera{360, 300, 420.0, 420.0, 179.5, 149.5};
-  // z of the camera points at the mesh's centre, x to the right and level.
   const geometry::Vector3d forward = geometry::Vector3d(0.5, 0.75, -0.45).normalized();
-  const geometry::Vector3d right = forward.cross(geometry::Vector3d::UnitZ()).normalized();
-  geometry::Matrix3d R_WC;
-  R_WC << right, forward.cross(right), forward;
-  const geometry::Pose X_WC{geometry::Quaterniond(R_WC), -3.4 * radius * forward};
+  const geometry::Pose X_WC{geometry::Quaterniond(geometry::level_camera(forward)), -3.4 * radius * forward};
   rendering::RenderScene scene;
   scene.instances.push_back({mesh, {R_WB, -(R_WB * p_BoC)}, rendering::SurfaceMaterial::opaque({205, 190, 165})});
   rendering::RenderOptions options;

@@ -11,6 +11,7 @@
 #include "prescene/belief/body_names.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/geometry/dense_solvers.h"
+#include "prescene/geometry/level_camera.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/sensor/simulated_camera.h"
 #include "prescene/simulation/simulator.h"
@@ -82,11 +83,7 @@ class Imagination {
       const Vector3d target = focus_ + Vector3d(draws_.uniform(-0.12, 0.12), draws_.uniform(-0.12, 0.12), 0.05);
       const Vector3d towards(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                              std::sin(elevation));
-      geometry::Matrix3d R;
-      R.col(2) = -towards;
-      R.col(0) = R.col(2).cross(Vector3d::UnitZ()).normalized();
-      R.col(1) = R.col(2).cross(R.col(0));
-      camera.X_WC = {geometry::Quaterniond(R).normalized(), target + distance * towards};
+      camera.X_WC = {geometry::Quaterniond(geometry::level_camera(-towards)).normalized(), target + distance * towards};
     }
     world_.camera = camera;
   }

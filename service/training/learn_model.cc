@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "prescene/geometry/dense_solvers.h"
+#include "prescene/geometry/level_camera.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/resting_poses.h"
 #include "prescene/geometry/sampling.h"
@@ -32,11 +33,7 @@ Pose looking_at_origin(double distance, bool lies, core::RandomStream& draws) {
   const double azimuth = draws.uniform(-std::numbers::pi, std::numbers::pi);
   const Vector3d from = distance * Vector3d(std::cos(elevation) * std::cos(azimuth),
                                             std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-  geometry::Matrix3d R;
-  R.col(2) = -from.normalized();
-  R.col(0) = R.col(2).cross(Vector3d::UnitZ()).normalized();
-  R.col(1) = R.col(2).cross(R.col(0));
-  return {geometry::Quaterniond(R).normalized(), from};
+  return {geometry::Quaterniond(geometry::level_camera(-from.normalized())).normalized(), from};
 }
 
 }  // namespace

@@ -19,6 +19,10 @@ namespace dense_solvers_h {
 extern const Eigen::MatrixXd covariance;
 }  // namespace dense_solvers_h
 
+namespace level_camera_h {
+extern const Vector3d target, eye;
+}  // namespace level_camera_h
+
 namespace mesh_facts_h {
 extern const std::shared_ptr<const TriangleMesh> cup;
 }  // namespace mesh_facts_h

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <vector>
 
 #include "prescene/geometry/camera.h"
 #include "prescene/geometry/image.h"
+#include "prescene/geometry/level_camera.h"
 #include "prescene/geometry/pixel_rays.h"
 #include "tests/support/generators.h"
 #include "tests/support/matchers.h"
@@ -33,6 +35,26 @@ TEST(PinholeCamera, UnprojectingIsTheInverse) {
     const Vector3d p_CQ = kCamera.unproject(u, v, depth);
     RC_ASSERT(p_CQ.z() == depth);
     RC_ASSERT((kCamera.project(p_CQ) - Eigen::Vector2d(u, v)).norm() < 1e-10);
+  }));
+}
+
+TEST(LevelCamera, LooksAlongX) {
+  Matrix3d R_WC;  // its x to the right (-y), its y down, its z ahead
+  R_WC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  EXPECT_EQ(level_camera(Vector3d::UnitX()), R_WC);
+}
+
+TEST(LevelCamera, IsARotationWithALevelXAndYDown) {
+  EXPECT_TRUE(rc::check([] {
+    const double azimuth = *tests::numbers(-3.14, 3.14), elevation = *tests::numbers(-1.5, 1.5);
+    const Vector3d forward(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                           std::sin(elevation));
+    const Matrix3d R_WC = level_camera(forward);
+    RC_ASSERT((R_WC.transpose() * R_WC - Matrix3d::Identity()).norm() < 1e-12);
+    RC_ASSERT(R_WC.determinant() > 0.0);
+    RC_ASSERT(R_WC.col(2) == forward);
+    RC_ASSERT(R_WC(2, 0) == 0.0);
+    RC_ASSERT(R_WC(2, 1) < 0.0);
   }));
 }
 
