@@ -179,14 +179,15 @@ class InstanceWorld {
 
   int body_count() const { return static_cast<int>(scene_->bodies.size()) + player_.pusher_count(); }
   Pose object_pose(const Object& object) const;
+  // What actions do: instance_actions.cc.
   void run_actions();
   void set_free(const std::vector<ActionPlayer::Released>& released);
   void load_objects();
+  void place_kinematic();
   /// Gravity, and what a hand does to it.
   Vector3d pull_on(const Object& object) const {
     return object.loaded ? Vector3d(scene_->scene.gravity_W + object.acceleration) : scene_->scene.gravity_W;
   }
-  void place_kinematic();
   void place_dynamic();
   /// Its velocity where a step begins.
   Vector3d begun(const Object& object) const { return object.v_WCm + object.owed * scene_->scene.gravity_W; }
