@@ -8,9 +8,9 @@
 #include <fstream>
 #include <iterator>
 
+#include "ending_otherwise.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/why_question.h"
-#include "prescene/rendering/reference/reference_renderer.h"
 #include "sliding_scene.h"
 #include "tests/support/paths.h"
 
@@ -22,12 +22,11 @@ using belief::PredictAnswer;
 using belief::PredictQuery;
 using belief::StabilityAnswer;
 using belief::StabilityQuery;
-using belief::ViewAnswer;
-using belief::ViewQuery;
 using belief::WhereAnswer;
 using belief::WhereQuery;
-using geometry::Pose;
 using testing::HasSubstr;
+using tests::blowing_up;
+using tests::context_ending;
 using tests::context_with;
 using tests::slide;
 using tests::sliding_scene;
@@ -44,50 +43,6 @@ StabilityQuery stability_of(const std::string& object) {
   StabilityQuery query;
   query.object = object;
   return query;
-}
-
-/// A simulator whose runs are a formula, some of which end otherwise than by their duration.
-class EndingOtherwise final : public simulation::Simulator {
- public:
-  using End =
-      std::function<std::optional<belief::TrajectoryEnd>(const belief::WorldState&, const simulation::RunRequest&)>;
-  EndingOtherwise(tests::FakeSimulator::Formula formula, End end) : fake_(std::move(formula)), end_(std::move(end)) {}
-
-  void run(std::span<const belief::WorldState> starts, const simulation::RunRequest& request,
-           const core::RandomStream& stream, simulation::InstanceNumbers numbers, core::ThreadPool& pool,
-           std::span<belief::Trajectory> trajectories, const core::Cancellation* cancellation) const override {
-    fake_.run(starts, request, stream, numbers, pool, trajectories, cancellation);
-    for (std::size_t i = 0; i < starts.size(); ++i)
-      if (const auto end = end_(starts[i], request)) trajectories[i].end = *end;
-  }
-  std::unique_ptr<simulation::Instance> make_instance(const std::vector<belief::Action>&,
-                                                      const core::RandomStream&) const override {
-    return nullptr;
-  }
-
- private:
-  tests::FakeSimulator fake_;
-  End end_;
-};
-
-QueryContext context_ending(const EndingOtherwise::End& end, core::ThreadPool& pool) {
-  QueryContext context = context_with(slide, pool);
-  context.make_simulator = [end](const belief::Scene&, double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
-    return std::unique_ptr<simulation::Simulator>(std::make_unique<EndingOtherwise>(slide, end));
-  };
-  context.make_renderer = []() -> core::Result<std::unique_ptr<rendering::Renderer>> {
-    return rendering::make_reference_renderer();
-  };
-  return context;
-}
-
-/// Runs blow up whose carton is slippery (of a weight of 0.25), rough, or both.
-EndingOtherwise::End blowing_up(bool slippery, bool rough) {
-  return [=](const belief::WorldState& start, const simulation::RunRequest&) -> std::optional<belief::TrajectoryEnd> {
-    if (start.objects[0].physical.friction < tests::kSlideBelow ? slippery : rough)
-      return belief::TrajectoryEnd::kDiverged;
-    return std::nullopt;
-  };
 }
 
 TEST(Predict, AScenesPriorsGiveTheProbabilityOfTheirOutcomes) {
@@ -534,62 +489,6 @@ TEST(Stability, OfAnObjectThatIsNotThereIsAnError) {
   EXPECT_THAT(answer.error.message(), HasSubstr("'carton'"));
 }
 
-TEST(View, ShowsTheLikeliestAndWhereObjectsMayBe) {
-  core::ThreadPool pool(2);
-  QueryContext context = context_with(slide, pool);
-  context.make_renderer = []() -> core::Result<std::unique_ptr<rendering::Renderer>> {
-    return rendering::make_reference_renderer();
-  };
-  belief::Belief belief = two_hypotheses();
-  const Answer answer = queries::answer(belief, {"", ViewQuery{}}, context);
-  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
-  const auto& seen = std::get<ViewAnswer>(answer.what);
-  ASSERT_EQ(seen.label_names, (std::vector<std::string>{"carton", "cup", "table", "hand"}));
-  const geometry::PinholeCamera& camera = belief.scene->camera->intrinsics;
-  const auto pixel = [&](double x, double y, double z) {
-    const Eigen::Vector2d p = camera.project(belief.X_WC.inverse() * geometry::Vector3d(x, y, z));
-    return std::pair<int, int>(static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())));
-  };
-  // The heavier hypothesis stays; top of the carton at z = 0.2, that of the cup at 0.05.
-  const auto [cx, cy] = pixel(0.12, 0.0, 0.2);
-  EXPECT_EQ(seen.labels(cx, cy), 1);
-  EXPECT_NEAR(seen.depth(cx, cy), 1.3, 1e-3);
-  EXPECT_NEAR(seen.presence(cx, cy), 0.75, 1e-5);
-  const auto [ux, uy] = pixel(0.3, 0.3, 0.05);
-  EXPECT_EQ(seen.labels(ux, uy), 2);
-  EXPECT_NEAR(seen.presence(ux, uy), 1.0, 1e-5);
-  // Slid out of the view at x = 1.1; the table is no object, and nor is the hand.
-  const auto [tx, ty] = pixel(-0.5, -0.4, 0.0);
-  EXPECT_EQ(seen.labels(tx, ty), 3);
-  EXPECT_EQ(seen.presence(tx, ty), 0.0f);
-  const auto [hx, hy] = pixel(0.2, 0.0, 0.3);
-  EXPECT_EQ(seen.labels(hx, hy), 4);
-}
-
-TEST(View, StatesThatFailedAreNotDrawn) {
-  core::ThreadPool pool(1);
-  const belief::Belief belief = two_hypotheses();
-  const Answer answer = queries::answer(belief, {"", ViewQuery{}}, context_ending(blowing_up(true, false), pool));
-  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
-  const auto& seen = std::get<ViewAnswer>(answer.what);
-  EXPECT_GT(seen.failed_instances, 0);
-  ASSERT_EQ(seen.remarks.size(), 1u);
-  EXPECT_THAT(seen.remarks[0], HasSubstr("failed in the simulator"));
-  const Eigen::Vector2d p =
-      belief.scene->camera->intrinsics.project(belief.X_WC.inverse() * geometry::Vector3d(0.12, 0.0, 0.2));
-  EXPECT_NEAR(seen.presence(static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))), 1.0, 1e-5);
-}
-
-TEST(View, WhoseLikeliestStateFailedIsAnError) {
-  core::ThreadPool pool(1);
-  const auto error_of = [&](bool slippery) {
-    return queries::answer(two_hypotheses(), {"", ViewQuery{}}, context_ending(blowing_up(slippery, true), pool))
-        .error.message();
-  };
-  EXPECT_THAT(error_of(false), HasSubstr("the likeliest start failed in the simulator"));
-  EXPECT_THAT(error_of(true), HasSubstr("every instance failed in the simulator"));
-}
-
 TEST(Documentation, ItsQuestionsAreUnderstood) {
   std::ifstream page(tests::source_dir() / "docs" / "reference" / "queries.md");
   ASSERT_TRUE(page) << "docs/reference/queries.md is missing";
@@ -611,128 +510,6 @@ TEST(Documentation, ItsQuestionsAreUnderstood) {
     EXPECT_TRUE(query) << block << core::to_string(query.status());
   }
   EXPECT_GE(questions, 4);
-}
-
-TEST(View, OfNowNeedsNoSimulator) {
-  core::ThreadPool pool(1);
-  QueryContext context;
-  context.pool = &pool;
-  context.make_renderer = []() -> core::Result<std::unique_ptr<rendering::Renderer>> {
-    return rendering::make_reference_renderer();
-  };
-  ViewQuery now;
-  now.time = 0.0;
-  const belief::Belief belief = two_hypotheses();
-  const Answer answer = queries::answer(belief, {"", now}, context);
-  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
-  const auto& seen = std::get<ViewAnswer>(answer.what);
-  const Eigen::Vector2d p =
-      belief.scene->camera->intrinsics.project(belief.X_WC.inverse() * geometry::Vector3d(0.11, 0.0, 0.2));
-  // Both hypotheses cover it.
-  EXPECT_NEAR(seen.presence(static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))), 1.0, 1e-5);
-}
-
-/// The view of now from any pose, with all that it can have.
-ViewAnswer detailed_view(const belief::Belief& belief, const ViewQuery& asked) {
-  core::ThreadPool pool(1);
-  QueryContext context;
-  context.pool = &pool;
-  context.make_renderer = []() -> core::Result<std::unique_ptr<rendering::Renderer>> {
-    return rendering::make_reference_renderer();
-  };
-  ViewQuery query = asked;
-  query.time = 0.0;
-  query.detail = {true, true, true};
-  const Answer answer = queries::answer(belief, {"", query}, context);
-  EXPECT_TRUE(answer.error.ok()) << answer.error.message();
-  return answer.error.ok() ? std::get<ViewAnswer>(answer.what) : ViewAnswer{};
-}
-
-// Two poses of the carton, of weights 1/4 and 3/4, whose tops are 0.02 m apart in height: the deviation of the choice
-// is 0.02 sqrt(3/16).
-TEST(View, HasMeanAndDeviationOfTheDepthFromAnyPose) {
-  belief::Belief belief = two_hypotheses();
-  for (belief::Particle& particle : belief.objects[0].particles) particle.covariance.setZero();
-  belief.objects[0].particles[0].X_WO = Pose::from_translation({0.0, 0.0, 0.12});
-  belief.objects[0].particles[1].X_WO = Pose::from_translation({0.0, 0.0, 0.1});
-  belief.robot = {Pose::from_translation({0.9, 0.9, 0.9})};
-  ViewQuery query;
-  query.X_WC = Pose{geometry::Quaterniond(0.0, 1.0, 0.0, 0.0), {0.0, 0.0, 1.0}};
-  query.intrinsics = geometry::PinholeCamera{41, 31, 40.0, 40.0, 20.0, 15.0};
-  const ViewAnswer seen = detailed_view(belief, query);
-  ASSERT_TRUE(seen.mean_depth && seen.depth_deviation);
-  ASSERT_EQ(seen.mean_depth->width(), 41);
-  EXPECT_NEAR((*seen.mean_depth)(20, 15), 0.25 * 0.78 + 0.75 * 0.8, 1e-5);
-  EXPECT_NEAR((*seen.depth_deviation)(20, 15), 0.02 * std::sqrt(3.0 / 16.0), 1e-5);
-  EXPECT_NEAR(seen.depth(20, 15), 0.8, 1e-5);
-  // The table beside it is known exactly.
-  EXPECT_NEAR((*seen.mean_depth)(38, 2), 1.0, 1e-5);
-  EXPECT_NEAR((*seen.depth_deviation)(38, 2), 0.0, 1e-6);
-  ASSERT_EQ(seen.objects.size(), 2u);
-  EXPECT_EQ(seen.objects[0].object, "carton");
-  EXPECT_NEAR(seen.objects[0].probability(20, 15), 1.0, 1e-5);
-  EXPECT_EQ(seen.objects[1].probability(20, 15), 0.0f);
-}
-
-// Of 64 states, each without the object with probability 0.4: four standard errors are 0.25.
-TEST(View, AnObjectThatMayNotBeThereIsInAShareOfTheStates) {
-  belief::Belief belief = two_hypotheses();
-  belief.objects[0].existence = 0.6;
-  for (belief::Particle& particle : belief.objects[0].particles) {
-    particle.covariance.setZero();
-    particle.X_WO = Pose::from_translation({0.0, 0.0, 0.1});
-  }
-  const ViewAnswer seen = detailed_view(belief, {});
-  const Eigen::Vector2d p =
-      belief.scene->camera->intrinsics.project(belief.X_WC.inverse() * geometry::Vector3d(0, 0, 0.2));
-  const int x = static_cast<int>(std::lround(p.x())), y = static_cast<int>(std::lround(p.y()));
-  EXPECT_NEAR(seen.objects[0].probability(x, y), 0.6, 0.25);
-  EXPECT_EQ(seen.objects[0].probability(x, y), seen.presence(x, y));
-  EXPECT_EQ(seen.objects[0].existence, 0.6);
-}
-
-TEST(View, ColourIsThatOfModelsThatHaveOneAndElseAbsent) {
-  belief::Belief belief = two_hypotheses();
-  const ViewAnswer without = detailed_view(belief, {});
-  EXPECT_FALSE(without.color.has_value());
-  EXPECT_THAT(without.remarks, testing::Contains(HasSubstr("No colour is known")));
-  auto scene = std::make_shared<belief::Scene>(*belief.scene);
-  scene->models[1].color = {1.0, 0.0, 0.0};
-  belief.scene = scene;
-  const ViewAnswer with = detailed_view(belief, {});
-  ASSERT_TRUE(with.color.has_value());
-  ASSERT_EQ(with.color_sources.size(), 4u);
-  EXPECT_EQ(with.color_sources[0].from, "");
-  EXPECT_EQ(with.color_sources[1].from, "model");
-  const Eigen::Vector2d p =
-      belief.scene->camera->intrinsics.project(belief.X_WC.inverse() * geometry::Vector3d(0.3, 0.3, 0.05));
-  const geometry::Rgb cup = (*with.color)(static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y())));
-  EXPECT_GT(cup[0], 100);
-  EXPECT_EQ(cup[1], 0);
-  EXPECT_EQ((*with.color)(0, 0), (geometry::Rgb{0, 0, 0})) << "the table's colour is not known";
-}
-
-TEST(View, ImagesThatAnAnswerCannotHoldAreRefusedBeforeAnyWork) {
-  core::ThreadPool pool(1);
-  QueryContext context = context_with(slide, pool);
-  context.make_renderer = []() -> core::Result<std::unique_ptr<rendering::Renderer>> {
-    return core::unavailable("never asked");
-  };
-  ViewQuery query;
-  query.intrinsics = geometry::PinholeCamera{2048, 2048, 1000.0, 1000.0, 1023.5, 1023.5};
-  const Answer answer = queries::answer(two_hypotheses(), {"", query}, context);
-  EXPECT_EQ(answer.error.code(), core::StatusCode::kResourceExhausted);
-  EXPECT_THAT(answer.error.message(), HasSubstr("smaller 'intrinsics'"));
-}
-
-TEST(View, NeedsACamera) {
-  core::ThreadPool pool(1);
-  auto scene = sliding_scene();
-  scene->camera.reset();
-  EXPECT_THAT(queries::answer(scene, 1, {"", ViewQuery{}}, context_with(slide, pool)).error.message(),
-              HasSubstr("no camera"));
-  EXPECT_THAT(queries::answer(sliding_scene(), 1, {"", ViewQuery{}}, context_with(slide, pool)).error.message(),
-              HasSubstr("no renderer"));
 }
 
 }  // namespace
