@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "achieve_options.h"
+#include "output_files.h"
 #include "prescene/belief/json.h"
 #include "prescene/interfaces/images/png.h"
 #include "prescene/interfaces/reports/action_map_picture.h"

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 
+#include "output_files.h"
 #include "prescene/interfaces/bags/bag_reader.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "output_files.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/calibration/object_calibration.h"

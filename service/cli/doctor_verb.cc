@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "output_files.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/images/png.h"
 #include "prescene/service/live/doctor.h"

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "evaluation_report.h"
+#include "output_files.h"
 #include "prescene/core/text.h"
 #include "prescene/service/calibration/toss_evaluation.h"
 

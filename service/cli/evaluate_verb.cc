@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "evaluate_folder.h"
+#include "output_files.h"
 #include "prescene/core/text.h"
 #include "prescene/service/evaluate/cleargrasp.h"
 #include "prescene/service/evaluate/credible_regions.h"

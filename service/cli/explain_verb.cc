@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "explanation_text.h"
+#include "output_files.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/images/png.h"

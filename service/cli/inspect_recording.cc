@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "output_files.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/images/png.h"
 #include "prescene/queries/camera_name.h"

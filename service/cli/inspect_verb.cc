@@ -8,6 +8,7 @@
 #include <span>
 
 #include "inspect_recording.h"
+#include "output_files.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/scene_files/mesh_use.h"
 #include "prescene/service/calibration/depth_noise.h"

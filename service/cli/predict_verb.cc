@@ -6,6 +6,7 @@
 #include <optional>
 #include <system_error>
 
+#include "output_files.h"
 #include "prescene/belief/json.h"
 #include "prescene/belief/query_limits.h"
 #include "prescene/core/text.h"

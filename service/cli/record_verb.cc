@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "output_files.h"
 #include "prescene/belief/json.h"
 #include "prescene/interfaces/bags/bag_writer.h"
 #include "prescene/interfaces/bytes/file.h"

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "final_states.h"
+#include "output_files.h"
 #include "prescene/belief/json.h"
 #include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/file.h"

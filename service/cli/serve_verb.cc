@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "output_files.h"
 #include "prescene/belief/json.h"
 #include "prescene/interfaces/scene_files/scene_file.h"
 #include "prescene/service/live/live_service.h"

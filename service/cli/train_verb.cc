@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "output_files.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/text.h"
 #include "prescene/service/load_scene.h"
