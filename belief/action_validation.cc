@@ -15,8 +15,8 @@ using core::invalid_input;
 using core::not_found;
 using core::Status;
 
-constexpr double kMostTurns = 100.0;  // rad of a pour
-constexpr double kLeastLever = 1e-3;  // m, of a handle
+constexpr double kLargestTurn = 100.0;  // rad, of a pour or tilt
+constexpr double kLeastLever = 1e-3;    // m, of a handle
 constexpr ScalarRange kForceRange{0.0, 1e6, "give a force in N, at least 0 and at most 1e6", true};
 constexpr ScalarRange kTorqueRange{0.0, 1e6, "give a torque in N m, at least 0 and at most 1e6", true};
 constexpr ScalarRange kImpulseRange{-1e6, 1e6, "give an impulse in N s between -1e6 and 1e6"};
@@ -117,7 +117,7 @@ struct ActionCheck {
   }
   static Status check_turn(const Vector3d& axis, double angle, double duration) {
     PRESCENE_RETURN_IF_ERROR(check_axis(axis));
-    if (!(std::abs(angle) <= kMostTurns))
+    if (!(std::abs(angle) <= kLargestTurn))
       return invalid_input("the angle is not a number between -100 and 100: give radians");
     return check_finite_positive(duration, "a duration");
   }
