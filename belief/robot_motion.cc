@@ -2,14 +2,13 @@
 #include "prescene/belief/robot_motion.h"
 
 #include <algorithm>
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
 
 namespace prescene::belief {
 namespace {
-
-/// X_GO while the body holds the object, at the scene's start.
-Pose grip(const KinematicBody& body, const SceneObject& object) {
-  return pose_at(body, 0.0).inverse() * mean(object.pose);
-}
 
 struct Duration {
   double operator()(const Release& release) const {
@@ -21,6 +20,93 @@ struct Duration {
   double operator()(const Lasting& lasting) const {
     return lasting.duration;
   }
+};
+
+/// What the hands and what they hold do by plan, action by action.
+class Plan {
+ public:
+  explicit Plan(const Scene& scene) : scene_(scene), bodies_(scene.robot.size()), objects_(scene.objects.size()) {
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+      const SceneObject& object = scene.objects[i];
+      objects_[i].X_WO = mean(object.pose);
+      objects_[i].hand = object.held_by ? find_robot_body(scene, *object.held_by) : std::nullopt;
+      if (objects_[i].hand) objects_[i].X_GO = timeline_pose(*objects_[i].hand, 0.0).inverse() * objects_[i].X_WO;
+    }
+  }
+
+  Pose pose_of(int hand, double time) const {
+    const Body& body = bodies_[static_cast<std::size_t>(hand)];
+    Pose X_WG = body.carries ? body.carries(time) : timeline_pose(hand, time);
+    for (const Shift& shift : body.shifts) X_WG.translation += share_done(shift.begin, shift.duration, time) * shift.by;
+    return X_WG;
+  }
+
+  void begin(const Action& action) {
+    const std::optional<int> index = find_object(scene_, object_of(action));
+    if (!index) return;
+    Object& object = objects_[static_cast<std::size_t>(*index)];
+    if (const auto* grasp = std::get_if<Grasp>(&action.what)) {
+      const std::optional<int> hand = find_robot_body(scene_, grasp->hand);
+      if (!hand) return;
+      if (object.hand) object.X_WO = pose_of(*object.hand, action.time) * object.X_GO;
+      object.hand = hand;
+      object.X_GO = pose_of(*hand, action.time).inverse() * object.X_WO;
+      return;
+    }
+    if (!object.hand) return;
+    const int hand = *object.hand;
+    Body& body = bodies_[static_cast<std::size_t>(hand)];
+    const Pose X_WG = pose_of(hand, action.time);
+    const Pose X_GO = object.X_GO;
+    const double from = action.time, duration = duration_of(action);
+    const auto carry = [&](std::function<Pose(double share)> at_share) {
+      body.carries = [=, at = std::move(at_share)](double time) { return at(share_done(from, duration, time)); };
+      body.shifts.clear();  // it begins where these ended
+    };
+    const auto go = [&](const PoseDistribution& X_WO) {  // the object takes the straight line
+      carry([X_WO_begin = X_WG * X_GO, X_WO_end = mean(X_WO), X_OG = X_GO.inverse()](double share) {
+        return geometry::interpolate(X_WO_begin, X_WO_end, share) * X_OG;
+      });
+    };
+    const auto turn = [&](const Vector3d& pivot_O, const Vector3d& axis_W, double angle) {
+      carry([=](double share) { return turned_about(X_WG * X_GO, pivot_O, axis_W, share * angle) * X_GO.inverse(); });
+    };
+    if (const auto* place = std::get_if<Place>(&action.what)) go(place->X_WO);
+    if (const auto* transport = std::get_if<Transport>(&action.what)) go(transport->X_WO);
+    if (const auto* pour = std::get_if<Pour>(&action.what)) turn(Vector3d::Zero(), pour->axis_W, pour->angle);
+    if (const auto* tilt = std::get_if<Tilt>(&action.what)) turn(tilt->pivot_O, tilt->axis_W, tilt->angle);
+    if (const auto* insert = std::get_if<Insert>(&action.what))
+      body.shifts.push_back({from, kMovingShare * duration, insert->distance * insert->axis_W.normalized()});
+    if (!lets_go(action)) return;
+    const auto* release = std::get_if<Release>(&action.what);
+    object.X_WO = pose_of(hand, release != nullptr ? from : from + duration) * X_GO;
+    object.hand.reset();
+    if (release != nullptr) body.shifts.push_back({from, release->retreat_duration, release->retreat});
+  }
+
+ private:
+  struct Shift {
+    double begin = 0.0, duration = 0.0;  // s
+    Vector3d by = Vector3d::Zero();      // m, in W
+  };
+  struct Body {
+    std::function<Pose(double time)> carries;  // of its last carrying, which ends where it stays; empty = the timeline
+    std::vector<Shift> shifts;                 // since then
+  };
+  struct Object {
+    std::optional<int> hand;  // that holds it
+    Pose X_GO;                // in this hand
+    Pose X_WO;                // while it is in none
+  };
+
+  Pose timeline_pose(int hand, double time) const {
+    const KinematicBody& body = scene_.robot[static_cast<std::size_t>(hand)];
+    return body.timeline.empty() ? Pose{} : pose_at(body, time);
+  }
+
+  const Scene& scene_;
+  std::vector<Body> bodies_;
+  std::vector<Object> objects_;
 };
 
 }  // namespace
@@ -43,54 +129,14 @@ Pose turned_about(const Pose& X_WO, const Vector3d& pivot_O, const Vector3d& axi
   return turned;
 }
 
-Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, int body_index, double time) {
-  const KinematicBody& body = scene.robot[static_cast<std::size_t>(body_index)];
-  const auto held = [&](const std::string& name) -> const SceneObject* {
-    const std::optional<int> index = find_object(scene, name);
-    if (!index) return nullptr;
-    const SceneObject& object = scene.objects[static_cast<std::size_t>(*index)];
-    return object.held_by == body.name ? &object : nullptr;
-  };
-
-  Pose X_WG = pose_at(body, time);
-  bool carried = false;  // by an action, no more by the timeline
+Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, int body, double time) {
+  if (actions.empty()) return pose_at(scene.robot[static_cast<std::size_t>(body)], time);
+  Plan plan(scene);
   for (const Action& action : actions) {
     if (action.time > time) break;
-    if (const auto* release = std::get_if<Release>(&action.what)) {
-      if (!held(release->object)) continue;
-      X_WG.translation += share_done(action.time, release->retreat_duration, time) * release->retreat;
-      continue;
-    }
-    const auto carry = [&](const SceneObject& object, const PoseDistribution& X_WO, double duration) {
-      const Pose X_WG_end = mean(X_WO) * grip(body, object).inverse();
-      const Pose X_WG_begin = carried ? X_WG : pose_at(body, action.time);
-      X_WG = geometry::interpolate(X_WG_begin, X_WG_end, share_done(action.time, duration, time));
-      carried = true;
-    };
-    if (const auto* place = std::get_if<Place>(&action.what)) {
-      if (const SceneObject* object = held(place->object)) carry(*object, place->X_WO, place->duration);
-    } else if (const auto* transport = std::get_if<Transport>(&action.what)) {
-      if (const SceneObject* object = held(transport->object)) carry(*object, transport->X_WO, transport->duration);
-    } else if (const auto* insert = std::get_if<Insert>(&action.what)) {
-      if (!held(insert->object)) continue;
-      X_WG.translation +=
-          moved_share(action.time, insert->duration, time) * insert->distance * insert->axis_W.normalized();
-    }
-    const auto turn = [&](const std::string& name, const Vector3d& pivot_O, const Vector3d& axis_W, double angle) {
-      const SceneObject* object = held(name);
-      if (object == nullptr) return;
-      const Pose X_GO = grip(body, *object);
-      if (!carried) X_WG = pose_at(body, action.time);
-      X_WG = turned_about(X_WG * X_GO, pivot_O, axis_W, angle) * X_GO.inverse();
-      carried = true;
-    };
-    const double share = share_done(action.time, duration_of(action), time);
-    if (const auto* pour = std::get_if<Pour>(&action.what))
-      turn(pour->container, Vector3d::Zero(), pour->axis_W, share * pour->angle);
-    if (const auto* tilt = std::get_if<Tilt>(&action.what))
-      turn(tilt->object, tilt->pivot_O, tilt->axis_W, share * tilt->angle);
+    plan.begin(action);
   }
-  return X_WG;
+  return plan.pose_of(body, time);
 }
 
 }  // namespace prescene::belief

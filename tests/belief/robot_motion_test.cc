@@ -83,6 +83,70 @@ TEST(RobotMotion, TurnsWithWhatItTiltsAndGoesAlongWithWhatItInserts) {
   EXPECT_NEAR(robot_pose_at(scene, inserted, 0, 1.4).translation.z(), 0.8, 1e-12);
 }
 
+Action transport_to(double time, const Vector3d& p_WO) {
+  Transport transport;
+  transport.object = "cup";
+  transport.X_WO = FixedPose{Pose::from_translation(p_WO)};
+  transport.duration = 0.5;
+  return {time, transport};
+}
+
+Action release_at(double time) {
+  Release release;
+  release.object = "cup";
+  release.retreat = {0.0, 0.1, 0.2};
+  return {time, release};
+}
+
+// Grasped at the start is held from the start, whatever is done then.
+TEST(RobotMotion, GoesWithWhatItGraspedAsWithWhatItHeld) {
+  Scene holding = scene_with_hand();
+  Scene grasping = holding;
+  grasping.objects[0].held_by.reset();
+  Tilt tilt;
+  tilt.object = "cup";
+  tilt.axis_W = Vector3d::UnitX();
+  tilt.angle = 0.7;
+  const std::vector<Action> actions = {
+      transport_to(0.4, {0.3, 0.2, 0.8}), {1.0, tilt}, transport_to(2.2, {-0.4, 0.1, 1.2}), release_at(3.0)};
+  std::vector<Action> with_grasp = actions;
+  with_grasp.insert(with_grasp.begin(), {0.0, Grasp{"cup", "hand", {}}});
+  for (double time = 0.0; time < 4.0; time += 0.05) {
+    const Pose held = robot_pose_at(holding, actions, 0, time);
+    EXPECT_LT(geometry::box_minus(robot_pose_at(grasping, with_grasp, 0, time), held).norm(), 1e-12) << time;
+  }
+  EXPECT_GT((robot_pose_at(grasping, with_grasp, 0, 3.9).translation - Vector3d(0.0, 0.0, 1.0)).norm(), 0.2);
+}
+
+TEST(RobotMotion, GraspsAThingWhereItWasPutAndTakesItFromAnotherHand) {
+  Scene scene = scene_with_hand();
+  scene.robot[0].timeline.resize(1);
+  KinematicBody other = scene.robot[0];
+  other.name = "other";
+  other.timeline[0].X_WG = Pose::from_translation({0.5, 0.0, 0.7});
+  scene.robot.push_back(other);
+  // Put down 0.1 m below the first hand, then taken by the second, which is 0.4 m beside it by then.
+  const std::vector<Action> put = {transport_to(0.5, {0.1, 0.0, 0.7}),
+                                   release_at(1.0),
+                                   {2.0, Grasp{"cup", "other", {}}},
+                                   transport_to(2.5, {0.1, 0.3, 0.9})};
+  EXPECT_LT((robot_pose_at(scene, put, 1, 5.0).translation - Vector3d(0.5, 0.3, 0.9)).norm(), 1e-12);
+  EXPECT_LT((robot_pose_at(scene, put, 0, 5.0).translation - Vector3d(0.1, 0.1, 1.0)).norm(), 1e-12);
+  // The same where nobody lets go of it first.
+  const std::vector<Action> handed = {put[0], put[2], put[3]};
+  EXPECT_LT((robot_pose_at(scene, handed, 1, 5.0).translation - Vector3d(0.5, 0.3, 0.9)).norm(), 1e-12);
+  EXPECT_LT((robot_pose_at(scene, handed, 0, 5.0).translation - Vector3d(0.1, 0.0, 0.8)).norm(), 1e-12);
+}
+
+TEST(RobotMotion, WhatIsLetGoOfMovesTheHandNoMore) {
+  Scene scene = scene_with_hand();
+  scene.robot[0].timeline.resize(1);
+  const std::vector<Action> actions = {release_at(0.5), transport_to(1.0, {0.3, 0.2, 0.8}), release_at(2.0)};
+  EXPECT_LT((robot_pose_at(scene, actions, 0, 5.0).translation - Vector3d(0.0, 0.1, 1.2)).norm(), 1e-12);
+  const std::vector<Action> unknown = {{0.2, Grasp{"spoon", "hand", {}}}, {0.3, Grasp{"cup", "foot", {}}}};
+  EXPECT_LT((robot_pose_at(scene, unknown, 0, 5.0).translation - Vector3d(0.0, 0.0, 1.0)).norm(), 1e-12);
+}
+
 TEST(RobotMotion, ActionsLastAsLongAsTheyMoveSomething) {
   Release release;
   release.retreat_duration = 0.5;

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "prescene/belief/robot_motion.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
 #include "tests/service/recorded_box.h"
@@ -93,6 +94,37 @@ TEST_F(PlayedSceneTest, WhatAChangeDoesNotTouchGoesOnAsWithoutIt) {
   for (std::size_t i = 0; i < states.size(); ++i)
     EXPECT_LT((poses[i].translation - states[i].objects[1].X_WO.translation).norm(), 2e-3) << i;
   EXPECT_LT(poses.back().translation.z(), 0.05);
+}
+
+// Cameras see the hands where robot_pose_at() has them, and the robot reports these places: they are the simulator's,
+// in which what a hand grasped does not move.
+TEST_F(PlayedSceneTest, WhatIsGraspedStaysWhereItIsInTheHandThatIsShown) {
+  belief::Scene scene = *scene_;
+  scene.robot[0].timeline.resize(1);
+  scene.objects[1].held_by.reset();
+  geometry::Pose turned = geometry::Pose::from_translation({0.1, 0.2, 0.4});
+  turned.rotation = geometry::exp_rotation({0.3, -0.5, 0.9});
+  scene.actions = {
+      {0.0, belief::Grasp{"held", "hand", {}}},
+      {0.1, belief::Transport{"held", belief::FixedPose{turned}, 0.2}},
+      {0.5, belief::Transport{"held", belief::FixedPose{geometry::Pose::from_translation({0, 0, 0.3})}, 0.3}}};
+  ASSERT_TRUE(belief::validate(scene).ok());
+  const geometry::Pose X_GO = belief::pose_at(scene.robot[0], 0.0).inverse() * belief::mean(scene.objects[1].pose);
+  for (const std::vector<UnannouncedChange>& changes :
+       {std::vector<UnannouncedChange>{}, std::vector<UnannouncedChange>{{0.4, "left", std::nullopt}}}) {
+    const auto parts = play_scene(scene, changes, backends_.simulator_factory(), kFrameInterval, 1, pool_);
+    ASSERT_TRUE(parts.ok()) << parts.status().message();
+    for (const PlayedPart& part : *parts)
+      for (const belief::WorldState& state : part.trajectory.states) {
+        const auto held = static_cast<std::size_t>(*belief::find_object(part.scene, "held"));
+        const geometry::Pose X_WG = belief::robot_pose_at(scene, scene.actions, 0, state.time);
+        EXPECT_LT(geometry::box_minus(X_WG.inverse() * state.objects[held].X_WO, X_GO).norm(), 1e-3) << state.time;
+      }
+    EXPECT_LT((parts->back().trajectory.final().objects[changes.empty() ? 1 : 0].X_WO.translation -
+               geometry::Vector3d(0, 0, 0.3))
+                  .norm(),
+              1e-3);
+  }
 }
 
 TEST_F(PlayedSceneTest, APushUnderWayGoesOn) {
