@@ -181,10 +181,7 @@ void ActionPlayer::finish_carry(int object, std::vector<Released>& released) {
   const double end = hold.begin + belief::duration_of(actions_[index]);
   const Pose X_WO = carrying_pose(hold, end);
   if (hold.hand >= 0) {
-    Hand& hand = hands_[static_cast<std::size_t>(hold.hand)];
-    hand.carries = -1;
-    hand.stays = true;
-    hand.X_WG_stay = X_WO * hold.X_GO.inverse();
+    stop(hold.hand, X_WO * hold.X_GO.inverse());
   } else {
     hold.X_GO = X_WO;
   }
@@ -196,6 +193,13 @@ void ActionPlayer::finish_carry(int object, std::vector<Released>& released) {
   } else {
     hold.control = Control::kHeld;
   }
+}
+
+void ActionPlayer::stop(int robot, const Pose& X_WG) {
+  hands_[static_cast<std::size_t>(robot)] = {-1, true, X_WG};
+  // Where it backed off to before, it set out from.
+  for (Step& step : steps_)
+    if (step.hand == robot) step.hand = -1;
 }
 
 void ActionPlayer::execute(std::size_t index, double time, double dt, const std::vector<Pose>& poses,
@@ -213,12 +217,7 @@ void ActionPlayer::execute(std::size_t index, double time, double dt, const std:
     V_WO.linear += drawn_[index].disturbance.linear;
     V_WO.angular += drawn_[index].disturbance.angular;
     if (hold.hand >= 0) {
-      Hand& hand = hands_[static_cast<std::size_t>(hold.hand)];
-      if (hand.carries == *object) {
-        hand.X_WG_stay = robot_pose(hold.hand, time);
-        hand.stays = true;
-        hand.carries = -1;
-      }
+      if (hands_[static_cast<std::size_t>(hold.hand)].carries == *object) stop(hold.hand, robot_pose(hold.hand, time));
       steps_[index].hand = hold.hand;
     }
     hold = Hold{};
@@ -229,13 +228,8 @@ void ActionPlayer::execute(std::size_t index, double time, double dt, const std:
     const std::optional<int> object = object_of(grasp->object);
     const std::optional<int> hand = belief::find_robot_body(*scene_, grasp->hand);
     if (!object || !hand) return;
-    for (std::size_t i = 0; i < hands_.size(); ++i) {  // what carried it stops here
-      Hand& other = hands_[i];
-      if (other.carries != *object) continue;
-      other.X_WG_stay = robot_pose(static_cast<int>(i), time);
-      other.stays = true;
-      other.carries = -1;
-    }
+    for (std::size_t i = 0; i < hands_.size(); ++i)  // what carried it stops here
+      if (hands_[i].carries == *object) stop(static_cast<int>(i), robot_pose(static_cast<int>(i), time));
     Hold& hold = objects_[static_cast<std::size_t>(*object)];
     hold = Hold{};
     hold.control = Control::kHeld;

@@ -127,6 +127,25 @@ TEST_F(PlayedSceneTest, WhatIsGraspedStaysWhereItIsInTheHandThatIsShown) {
   }
 }
 
+// What it backs off by when it lets go of one thing is no part of where it takes the next.
+TEST_F(PlayedSceneTest, AHandThatBackedOffTakesTheNextThingToItsGoal) {
+  belief::Scene scene = *scene_;
+  scene.robot[0].timeline.resize(1);
+  const geometry::Vector3d goal(-0.2, 0.1, 0.2);
+  scene.actions = {{0.1, belief::Release{"held", {0.0, 0.0, 0.2}, 0.1, {}}},
+                   {0.3, belief::Grasp{"left", "hand", {}}},
+                   {0.4, belief::Transport{"left", belief::FixedPose{geometry::Pose::from_translation(goal)}, 0.3}}};
+  ASSERT_TRUE(belief::validate(scene).ok());
+  const auto parts = play_scene(scene, {}, backends_.simulator_factory(), kFrameInterval, 1, pool_);
+  ASSERT_TRUE(parts.ok()) << parts.status().message();
+  const belief::WorldState& end = parts->back().trajectory.final();
+  EXPECT_LT((end.objects[0].X_WO.translation - goal).norm(), 1e-3);
+  const geometry::Vector3d grasped_from = belief::mean(scene.objects[0].pose).translation;
+  const geometry::Vector3d moved = belief::robot_pose_at(scene, scene.actions, 0, end.time).translation -
+                                   belief::robot_pose_at(scene, scene.actions, 0, 0.3).translation;
+  EXPECT_LT((moved - (goal - grasped_from)).norm(), 1e-9);
+}
+
 TEST_F(PlayedSceneTest, APushUnderWayGoesOn) {
   const auto whole = play({});
   const auto changed = play({{0.5, "held", std::nullopt}});

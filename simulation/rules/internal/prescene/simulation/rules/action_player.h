@@ -127,6 +127,8 @@ class ActionPlayer {
 
   void execute(std::size_t index, double time, double dt, const std::vector<Pose>& poses,
                std::vector<Released>& released);
+  /// The hand carries nothing any more, and stays there.
+  void stop(int robot, const Pose& X_WG);
   void finish_carry(int object, std::vector<Released>& released);
   Pose carried_pose(const Hold& hold, double time) const;
   /// Where the hand that carries it has it.
