@@ -391,7 +391,7 @@ TEST(OwnActions, AForceIsNeverChosenWhereTheSceneCutsIt) {
     EXPECT_TRUE(ask(one, query).error.ok());
     query.free = {{"force", 9.0, 16.0}};
     EXPECT_THAT(ask(one, query).error.message(), HasSubstr("free.force: 16 is out of range: "));
-    query.free = {{"force", 7.0, {}}};
+    query.free = {{"force", 7.0, 12.0}};
     EXPECT_THAT(ask(one, query).error.message(), HasSubstr("give at least 8"));
     query.free = {{"direction", -90.0, 90.0}};
     query.fixed = {{"force", 40.0}};
