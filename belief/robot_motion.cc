@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -21,6 +22,8 @@ struct Duration {
     return lasting.duration;
   }
 };
+
+constexpr double kTimeRounding = 1e-9;  // s; times that differ by less are the same
 
 /// What the hands and what they hold do by plan, action by action.
 class Plan {
@@ -42,49 +45,62 @@ class Plan {
   }
 
   void begin(const Action& action) {
-    const std::optional<int> index = find_object(scene_, object_of(action));
-    if (!index) return;
-    Object& object = objects_[static_cast<std::size_t>(*index)];
+    const double from = action.time;
+    for (std::size_t i = 0; i < objects_.size(); ++i)
+      if (objects_[i].until <= from + kTimeRounding) let_go(i, objects_[i].until);
+    const std::optional<int> found = find_object(scene_, object_of(action));
+    if (!found) return;
+    const auto index = static_cast<std::size_t>(*found);
+    Object& object = objects_[index];
     if (const auto* grasp = std::get_if<Grasp>(&action.what)) {
       const std::optional<int> hand = find_robot_body(scene_, grasp->hand);
       if (!hand) return;
-      if (object.hand) object.X_WO = pose_of(*object.hand, action.time) * object.X_GO;
+      let_go(index, from);
       object.hand = hand;
-      object.X_GO = pose_of(*hand, action.time).inverse() * object.X_WO;
+      object.X_GO = pose_of(*hand, from).inverse() * object.X_WO;
       return;
     }
     if (!object.hand) return;
     const int hand = *object.hand;
     Body& body = bodies_[static_cast<std::size_t>(hand)];
-    const Pose X_WG = pose_of(hand, action.time);
+    if (const auto* release = std::get_if<Release>(&action.what)) {
+      let_go(index, from);
+      // A hand that carries another object goes on with that.
+      if (body.until <= from + kTimeRounding)
+        body.shifts.push_back({from, release->retreat_duration, release->retreat});
+      return;
+    }
+    const Pose X_WG = pose_of(hand, from);
     const Pose X_GO = object.X_GO;
-    const double from = action.time, duration = duration_of(action);
-    const auto carry = [&](std::function<Pose(double share)> at_share) {
-      body.carries = [=, at = std::move(at_share)](double time) { return at(share_done(from, duration, time)); };
+    const auto carry = [&](double moves_for, std::function<Pose(double share)> at_share) {
+      body.carries = [=, at = std::move(at_share)](double time) { return at(share_done(from, moves_for, time)); };
       body.shifts.clear();  // it begins where these ended
+      body.object = index;
+      body.until = from + duration_of(action);
+      object.until = lets_go(action) ? body.until : kForever;
     };
     const auto go = [&](const PoseDistribution& X_WO) {  // the object takes the straight line
-      carry([X_WO_begin = X_WG * X_GO, X_WO_end = mean(X_WO), X_OG = X_GO.inverse()](double share) {
-        return geometry::interpolate(X_WO_begin, X_WO_end, share) * X_OG;
-      });
+      carry(duration_of(action),
+            [X_WO_begin = X_WG * X_GO, X_WO_end = mean(X_WO), X_OG = X_GO.inverse()](double share) {
+              return geometry::interpolate(X_WO_begin, X_WO_end, share) * X_OG;
+            });
     };
     const auto turn = [&](const Vector3d& pivot_O, const Vector3d& axis_W, double angle) {
-      carry([=](double share) { return turned_about(X_WG * X_GO, pivot_O, axis_W, share * angle) * X_GO.inverse(); });
+      carry(duration_of(action),
+            [=](double share) { return turned_about(X_WG * X_GO, pivot_O, axis_W, share * angle) * X_GO.inverse(); });
     };
     if (const auto* place = std::get_if<Place>(&action.what)) go(place->X_WO);
     if (const auto* transport = std::get_if<Transport>(&action.what)) go(transport->X_WO);
     if (const auto* pour = std::get_if<Pour>(&action.what)) turn(Vector3d::Zero(), pour->axis_W, pour->angle);
     if (const auto* tilt = std::get_if<Tilt>(&action.what)) turn(tilt->pivot_O, tilt->axis_W, tilt->angle);
-    if (const auto* insert = std::get_if<Insert>(&action.what))
-      body.shifts.push_back({from, kMovingShare * duration, insert->distance * insert->axis_W.normalized()});
-    if (!lets_go(action)) return;
-    const auto* release = std::get_if<Release>(&action.what);
-    object.X_WO = pose_of(hand, release != nullptr ? from : from + duration) * X_GO;
-    object.hand.reset();
-    if (release != nullptr) body.shifts.push_back({from, release->retreat_duration, release->retreat});
+    if (const auto* insert = std::get_if<Insert>(&action.what)) {
+      const Vector3d way = insert->distance * insert->axis_W.normalized();
+      carry(kMovingShare * insert->duration, [=](double share) { return Pose::from_translation(share * way) * X_WG; });
+    }
   }
 
  private:
+  static constexpr double kForever = std::numeric_limits<double>::infinity();
   struct Shift {
     double begin = 0.0, duration = 0.0;  // s
     Vector3d by = Vector3d::Zero();      // m, in W
@@ -92,12 +108,31 @@ class Plan {
   struct Body {
     std::function<Pose(double time)> carries;  // of its last carrying, which ends where it stays; empty = the timeline
     std::vector<Shift> shifts;                 // since then
+    std::size_t object = 0;                    // that it carries ...
+    double until = -kForever;                  // ... until then, s
   };
   struct Object {
     std::optional<int> hand;  // that holds it
     Pose X_GO;                // in this hand
     Pose X_WO;                // while it is in none
+    double until = kForever;  // s; when the hand lets go of it by what it does now
   };
+
+  /// The object is in no hand from then on; one that is on its way with it stops there.
+  void let_go(std::size_t index, double time) {
+    Object& object = objects_[index];
+    if (!object.hand) return;
+    const Pose X_WG = pose_of(*object.hand, time);
+    Body& body = bodies_[static_cast<std::size_t>(*object.hand)];
+    if (body.object == index && time < body.until) {
+      body.carries = [X_WG](double) { return X_WG; };
+      body.shifts.clear();
+      body.until = time;
+    }
+    object.X_WO = X_WG * object.X_GO;
+    object.hand.reset();
+    object.until = kForever;
+  }
 
   Pose timeline_pose(int hand, double time) const {
     const KinematicBody& body = scene_.robot[static_cast<std::size_t>(hand)];

@@ -138,6 +138,56 @@ TEST(RobotMotion, GraspsAThingWhereItWasPutAndTakesItFromAnotherHand) {
   EXPECT_LT((robot_pose_at(scene, handed, 0, 5.0).translation - Vector3d(0.1, 0.0, 0.8)).norm(), 1e-12);
 }
 
+TEST(RobotMotion, StaysWhereItLetsGoOnTheWay) {
+  Scene scene = scene_with_hand();
+  scene.robot[0].timeline.resize(1);
+  Place place;
+  place.object = "cup";
+  place.X_WO = FixedPose{Pose::from_translation({0.2, 0.0, 0.9})};
+  place.duration = 0.5;
+  for (const Action& way : {transport_to(0.5, {0.2, 0.0, 0.9}), Action{0.5, place}}) {
+    const std::vector<Action> actions = {
+        way, release_at(0.75), {2.0, Grasp{"cup", "hand", {}}}, transport_to(2.5, {0.1, 0.0, 0.7})};
+    EXPECT_LT((robot_pose_at(scene, actions, 0, 1.9).translation - Vector3d(0.1, 0.1, 1.2)).norm(), 1e-12);
+    EXPECT_LT((robot_pose_at(scene, actions, 0, 5.0).translation - Vector3d(0.1, 0.1, 1.0)).norm(), 1e-12);
+    // The same where another hand takes it.
+    Scene with_other = scene;
+    KinematicBody other = scene.robot[0];
+    other.name = "other";
+    other.timeline[0].X_WG = Pose::from_translation({0.5, 0.0, 0.7});
+    with_other.robot.push_back(other);
+    const std::vector<Action> handed = {way, {0.75, Grasp{"cup", "other", {}}}, transport_to(1.0, {0.1, 0.3, 0.9})};
+    EXPECT_LT((robot_pose_at(with_other, handed, 0, 5.0).translation - Vector3d(0.1, 0.0, 1.0)).norm(), 1e-12);
+    EXPECT_LT((robot_pose_at(with_other, handed, 1, 5.0).translation - Vector3d(0.5, 0.3, 0.7)).norm(), 1e-12);
+    // What begins on the way goes on from there, and nothing is let go of.
+    const std::vector<Action> changed = {way, transport_to(0.75, {0.1, 0.0, 0.7}), transport_to(2.0, {0.0, 0.0, 0.5})};
+    EXPECT_LT((robot_pose_at(scene, changed, 0, 1.0).translation - Vector3d(0.1, 0.0, 0.9)).norm(), 1e-12);
+    EXPECT_LT((robot_pose_at(scene, changed, 0, 5.0).translation - Vector3d(0.0, 0.0, 0.6)).norm(), 1e-12);
+  }
+}
+
+TEST(RobotMotion, WhatItInsertsTakesItFromItsTimeline) {
+  const Scene scene = scene_with_hand();
+  Insert insert;
+  insert.object = "cup";
+  insert.distance = 0.2;
+  const std::vector<Action> actions = {{0.5, insert}};
+  EXPECT_LT((robot_pose_at(scene, actions, 0, 0.9).translation - Vector3d(0.5, 0.0, 0.9)).norm(), 1e-12);
+  EXPECT_LT((robot_pose_at(scene, actions, 0, 3.0).translation - Vector3d(0.5, 0.0, 0.8)).norm(), 1e-12);
+}
+
+TEST(RobotMotion, DoesNotBackOffWhileItCarriesAnotherThing) {
+  Scene scene = scene_with_hand();
+  scene.robot[0].timeline.resize(1);
+  SceneObject lid = scene.objects[0];
+  lid.name = "lid";
+  scene.objects.push_back(lid);
+  const std::vector<Action> actions = {transport_to(0.5, {0.2, 0.0, 0.9}), {0.6, Release{"lid", {0.0, 0.0, 0.4}}}};
+  for (const double time : {0.75, 5.0})
+    EXPECT_EQ(robot_pose_at(scene, actions, 0, time).translation,
+              robot_pose_at(scene, std::vector<Action>{actions[0]}, 0, time).translation);
+}
+
 TEST(RobotMotion, WhatIsLetGoOfMovesTheHandNoMore) {
   Scene scene = scene_with_hand();
   scene.robot[0].timeline.resize(1);

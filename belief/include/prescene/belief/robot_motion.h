@@ -11,9 +11,10 @@ namespace prescene::belief {
 /// X_WG of robot body number `body` at `time` (s since the scene's start): its timeline; from a release of what it
 /// holds, shifted along the retreat; during and after a place or transport of what it holds, carried with that object
 /// to the action's mean pose (that in a straight line, at constant speed) and staying there; turned with it by a pour
-/// or tilt, and moved with it by an insertion, as if nothing were in the way. It holds what the scene says, and what it
-/// grasps until an action lets go of it: where that is when it is grasped follows from the scene's mean start and the
-/// actions before, as if nothing else had moved it. `actions` ascend in time.
+/// or tilt, and moved with it by an insertion, as if nothing were in the way. If it is let go of on such a way, the
+/// body stays where it is then. It holds what the scene says, and what it grasps until an action lets go of it: where
+/// that is when it is grasped follows from the scene's mean start and the actions before, as if nothing else had moved
+/// it. `actions` ascend in time.
 Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, int body, double time);
 
 /// For how long (s) an action moves something: a release, while the hand retreats. 0 for what is done at once.
