@@ -237,6 +237,7 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const Wo
     const double settles = falling[i].woken ? 1.0 : options.settle_probability;
     if (object.state != belief::TrackState::kTracked && settle_draws[i] < settles && is_slow(particle))
       settle(particle);
+    if (falling[i].woken && particle.mode == MotionMode::kMoving) ++report.pushed;
     ++report.simulated;
   }
   for (const auto& [key, run] : run_of_world) {

@@ -87,7 +87,7 @@ enum Degraded : std::uint32_t {
 std::string degraded_text(std::uint32_t bits);
 
 struct StepCounters {
-  int simulated = 0;      ///< Particles that physics moved.
+  int simulated = 0;      ///< Particles that physics moved, or found to stay where they rest.
   int not_simulated = 0;  ///< That it was to move and could not: they went on at constant velocity.
   int not_drawn = 0;      ///< Calls of the renderer that failed.
   int resampled = 0;      ///< Particle sets.
@@ -103,8 +103,8 @@ struct StepCounters {
   int turned_by_print = 0;      ///< Objects moved to a pose that depth takes for the same.
   int joint_islands = 0;        ///< Whose particles were worlds in this step, ...
   int worlds_joined = 0;        ///< ... those that had none before it, ...
-  int world_views = 0;          ///< ... frames that were prepared for what hides what in them, ...
-  int pushed_particles = 0;     ///< ... and particles at rest that another member set in motion.
+  int world_views = 0;          ///< ... and frames that were prepared for what hides what in them.
+  int pushed_particles = 0;     ///< At rest, that a robot body, a push or another of their world set in motion.
   int hidden_particles = 0;     ///< That stayed hidden.
   int hidden_proposed = 0;      ///< Put at places where a refuted object may hide.
   int looked_for = 0;           ///< At the start.

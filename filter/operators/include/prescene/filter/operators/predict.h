@@ -66,7 +66,7 @@ struct PredictOptions {
 
 /// What physics did in a step.
 struct PredictReport {
-  int simulated = 0;      ///< Particles that it moved.
+  int simulated = 0;      ///< Particles that it simulated; what rests and is not pushed stays where it is.
   int not_simulated = 0;  ///< Particles that it was to move and could not; they went on at constant velocity.
   int pushed = 0;         ///< Particles at rest that a robot body, a push or another of their world set in motion.
   /// Why it could not move the first of these; "" = it moved all.
