@@ -478,6 +478,18 @@ TEST_F(Predict, OfWhatRestsInViewPhysicsTakesAShareAlongWithARobotBody) {
   EXPECT_EQ(report.pushed, taken);
 }
 
+TEST_F(Predict, WhatIsSetInMotionOutOfSightIsCounted) {
+  for (const double speed : {0.5, 0.0}) {
+    belief::Belief belief = resting_in_view();
+    belief.objects[0].state = belief::TrackState::kUnseen;
+    const PredictReport report =
+        run(belief, Pose::from_translation({0.15, 0.0, 0.4}), 0.1, without_mode_changes(), {}, taking_along(speed));
+    const auto all = static_cast<int>(belief.objects[0].particles.size());
+    EXPECT_EQ(report.simulated, all);
+    EXPECT_EQ(report.pushed, speed > 0.0 ? all : 0);
+  }
+}
+
 TEST_F(Predict, WhatRestsInViewStaysWhereNothingPushesIt) {
   // Near the hand physics finds that it stays; far from it nothing is simulated; and neither where no body moves.
   struct Case {
