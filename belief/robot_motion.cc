@@ -31,9 +31,8 @@ class Plan {
   explicit Plan(const Scene& scene) : scene_(scene), bodies_(scene.robot.size()), objects_(scene.objects.size()) {
     for (std::size_t i = 0; i < objects_.size(); ++i) {
       const SceneObject& object = scene.objects[i];
-      objects_[i].X_WO = mean(object.pose);
       objects_[i].hand = object.held_by ? find_robot_body(scene, *object.held_by) : std::nullopt;
-      if (objects_[i].hand) objects_[i].X_GO = timeline_pose(*objects_[i].hand, 0.0).inverse() * objects_[i].X_WO;
+      if (objects_[i].hand) objects_[i].X_GO = timeline_pose(*objects_[i].hand, 0.0).inverse() * mean(object.pose);
     }
   }
 
@@ -57,7 +56,8 @@ class Plan {
       if (!hand) return;
       let_go(index, from);
       object.hand = hand;
-      object.X_GO = pose_of(*hand, from).inverse() * object.X_WO;
+      if (!object.X_WO) object.X_WO = mean(scene_.objects[index].pose);
+      object.X_GO = pose_of(*hand, from).inverse() * *object.X_WO;
       return;
     }
     if (!object.hand) return;
@@ -112,10 +112,10 @@ class Plan {
     double until = -kForever;                  // ... until then, s
   };
   struct Object {
-    std::optional<int> hand;  // that holds it
-    Pose X_GO;                // in this hand
-    Pose X_WO;                // while it is in none
-    double until = kForever;  // s; when the hand lets go of it by what it does now
+    std::optional<int> hand;   // that holds it
+    Pose X_GO;                 // in this hand
+    std::optional<Pose> X_WO;  // where a hand let go of it; nothing: none did
+    double until = kForever;   // s; when the hand lets go of it by what it does now
   };
 
   /// The object is in no hand from then on; one that is on its way with it stops there.
