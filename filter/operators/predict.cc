@@ -130,11 +130,12 @@ bool stands_still(const Pose& X_WG_from, const Pose& X_WG_to) {
   return geometry::box_minus(X_WG_to, X_WG_from).norm() < kStillBody;
 }
 
-/// A ball that something fills which moves in this step, at its start and its end.
+/// Something that moves in this step: all of it is, throughout the step, within `reach` of the box, which is fixed in
+/// frame M.
 struct Mover {
-  Vector3d p_from_W;
-  Vector3d p_to_W;
-  double radius;
+  Pose X_WM;
+  geometry::Box box;
+  double reach;
 };
 
 Vector3d position_of(const belief::Push& push, double since_begin) {
@@ -180,13 +181,21 @@ std::vector<Mover> movers_of(const belief::Belief& belief, std::span<const Pose>
   std::vector<Mover> movers;
   for (const belief::Action& action : belief.pushes) {
     const auto& push = std::get<belief::Push>(action.what);
-    movers.push_back({position_of(push, -action.time), position_of(push, dt - action.time), push.radius});
+    geometry::Box path(position_of(push, -action.time));
+    path.extend(position_of(push, dt - action.time));
+    movers.push_back({Pose::identity(), path, push.radius});
   }
   for (std::size_t i = 0; i < X_WG.size(); ++i) {
     if (stands_still(belief.robot[i], X_WG[i])) continue;
     const geometry::Box box = bounds_of(belief.scene->robot[i].collision);
-    if (!box.isEmpty())
-      movers.push_back({belief.robot[i] * box.center(), X_WG[i] * box.center(), 0.5 * box.diagonal().norm()});
+    if (box.isEmpty()) continue;
+    // Within the step its corners go no further than from one end to the other.
+    double way = 0.0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vector3d p_GC = box.corner(static_cast<geometry::Box::CornerType>(corner));
+      way = std::max(way, (X_WG[i] * p_GC - belief.robot[i] * p_GC).norm());
+    }
+    movers.push_back({X_WG[i], box, way});
   }
   return movers;
 }
@@ -194,9 +203,7 @@ std::vector<Mover> movers_of(const belief::Belief& belief, std::span<const Pose>
 /// Whether one of them may touch the ball in the step.
 bool may_touch(const std::vector<Mover>& movers, const Vector3d& p_W, double radius) {
   return std::any_of(movers.begin(), movers.end(), [&](const Mover& mover) {
-    const Vector3d path = mover.p_to_W - mover.p_from_W, to = p_W - mover.p_from_W;
-    const double at = path.squaredNorm() > 0.0 ? std::clamp(to.dot(path) / path.squaredNorm(), 0.0, 1.0) : 0.0;
-    return (to - at * path).norm() < radius + mover.radius;
+    return mover.box.exteriorDistance(mover.X_WM.inverse() * p_W) < radius + mover.reach;
   });
 }
 
