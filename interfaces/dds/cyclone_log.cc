@@ -29,7 +29,8 @@ struct AllListening {
   std::vector<Listening> list;
 };
 AllListening& all_listening() {
-  static AllListening all;
+  // Never destroyed: where nodes are still there when the process ends, Cyclone's threads may call the sink.
+  static AllListening& all = *new AllListening;
   return all;
 }
 
