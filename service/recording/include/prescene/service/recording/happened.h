@@ -62,7 +62,8 @@ struct HappenedRecord {
 
 /// Of a played scene: events, courses and joints. `parts` are of play_scene(scene, changes, ...), sampled as finely as
 /// times are wanted; `reported`: the robot announces its actions. The actions themselves; pushes from their first touch
-/// on; an object that comes out of a grip although no action lets go of it has slipped; and the changes, those of an object at one frame as one event.
+/// on; an object that comes out of a grip although no action lets go of it has slipped; and the changes, those of an
+/// object at one frame as one event.
 HappenedRecord happened_in(const belief::Scene& scene, std::span<const UnannouncedChange> changes,
                            std::span<const PlayedPart> parts, bool reported);
 
