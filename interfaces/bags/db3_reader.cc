@@ -85,7 +85,8 @@ struct Db3Reader::Impl {
   std::vector<McapChannel> channels;
   std::map<std::int64_t, int> channel_of_topic;
   std::set<std::int64_t> left_out_topics;
-  std::set<std::string> other_formats;
+  std::set<std::string> other_formats;  // the first of them
+  bool has_more_formats = false;
   std::uint64_t damaged = 0, stray = 0, in_other_formats = 0;
   bool ended = false;
 
@@ -219,7 +220,11 @@ Status Db3Reader::Impl::read_topics() {
       return core::data_loss(path.string() + ": two topics have the number " + std::to_string(id) + kDb3Remedy);
     if (format != "cdr") {
       left_out_topics.insert(id);
-      if (other_formats.size() < 10) other_formats.insert(name + " (" + quote(format, 40) + ")");
+      const std::string other = name + " (" + quote(format, 40) + ")";
+      if (other_formats.size() < 10)
+        other_formats.insert(other);
+      else if (!other_formats.contains(other))
+        has_more_formats = true;
       continue;
     }
     channel_of_topic.emplace(id, static_cast<int>(channels.size()));
@@ -327,7 +332,8 @@ std::string Db3Reader::loss_text() const {
   if (!impl.other_formats.empty()) {
     std::string names;
     for (const std::string& name : impl.other_formats) names += (names.empty() ? "" : ", ") + name;
-    say(std::to_string(impl.in_other_formats) + " messages that are not in CDR were left out: " + names);
+    say(std::to_string(impl.in_other_formats) + " messages that are not in CDR were left out: " + names +
+        (impl.has_more_formats ? " and others" : ""));
   }
   return out;
 }

@@ -172,8 +172,11 @@ std::string RecordingReader::loss_text() const {
 bool OtherEncodings::note(const interfaces::McapChannel& channel) {
   constexpr std::size_t kMostNamed = 10;
   if (channel.message_encoding == "cdr") return false;
+  const std::string name = channel.topic + " (" + interfaces::quote(channel.message_encoding, 40) + ")";
   if (channels_.size() < kMostNamed)
-    channels_.insert(channel.topic + " (" + interfaces::quote(channel.message_encoding, 40) + ")");
+    channels_.insert(name);
+  else if (!channels_.contains(name))
+    has_more_ = true;
   ++messages_;
   return true;
 }
@@ -182,7 +185,8 @@ std::string OtherEncodings::text() const {
   if (messages_ == 0) return "";
   std::string names;
   for (const std::string& name : channels_) names += (names.empty() ? "" : ", ") + name;
-  return std::to_string(messages_) + " messages that are not in CDR were left out: " + names;
+  return std::to_string(messages_) + " messages that are not in CDR were left out: " + names +
+         (has_more_ ? " and others" : "");
 }
 
 /// The message nearest to the one expected whose number has these lower bits.

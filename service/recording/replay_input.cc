@@ -71,7 +71,8 @@ core::Status check_steps(const ReplaySummary& summary, const InputTopics& topics
   if (!summary.first_refusal.empty()) return core::invalid_input("no frame could be used: " + summary.first_refusal);
   if (!summary.loss.empty() && summary.image_topics.empty())
     return core::invalid_input("no depth image on " + topics.depth + ", and no other image that can be read (" +
-                               summary.loss + "): record the camera's topics as messages of ROS 2");
+                               summary.loss +
+                               "): record the camera's topics (prescene doctor finds them), as messages of ROS 2");
   if (summary.image_topics.empty())
     return core::invalid_input("no depth image on " + topics.depth +
                                ", and no other image in the recording: record the "

@@ -177,6 +177,21 @@ TEST_F(Bags, WhatCanNotBeASqliteFileIsSaid) {
   EXPECT_EQ(failure_of(path("a.db3")).code(), StatusCode::kInvalidInput);
 }
 
+TEST_F(Bags, OfManyTopicsThatAreNotInCdrTenAreNamed) {
+  for (const int count : {10, 11}) {
+    const auto file = path(std::to_string(count) + ".db3");
+    std::vector<tests::Db3Topic> topics;
+    for (int i = 0; i < count; ++i) topics.push_back({"/t" + std::to_string(i), "x/msg/Y", "json"});
+    tests::write_db3(file, topics, {{1, 10, {1}}});
+    const auto reader = BagReader::open(file);
+    ASSERT_TRUE(reader.ok());
+    EXPECT_TRUE(read_all(**reader).empty());
+    EXPECT_THAT((*reader)->loss_text(), HasSubstr("1 messages that are not in CDR were left out: /t0 ('json'), "));
+    EXPECT_EQ((*reader)->loss_text().find("/t10 ("), std::string::npos);
+    EXPECT_EQ((*reader)->loss_text().ends_with(" and others"), count == 11) << (*reader)->loss_text();
+  }
+}
+
 TEST_F(Bags, OddMessagesAreRefusedOrCounted) {
   const auto file = path("odd.db3");
   tests::write_db3(file, {{"/a", "std_msgs/msg/String"}, {"/json", "x/msg/Y", "json"}},

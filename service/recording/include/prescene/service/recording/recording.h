@@ -187,6 +187,7 @@ class OtherEncodings {
  private:
   std::uint64_t messages_ = 0;
   std::set<std::string> channels_;  // the first of them
+  bool has_more_ = false;
 };
 
 /// Reads our recordings, and those of ROS 2 (interfaces::BagReader).
