@@ -4,8 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "json_fields.h"
 
@@ -33,11 +38,13 @@ std::vector<std::string> names_of(const BeliefSummary& summary) {
 /// Of each of the old ones, which of the new it is; nothing where one is not among them.
 std::optional<std::vector<std::size_t>> places_among(const std::vector<std::string>& old_names,
                                                      const std::vector<std::string>& new_names) {
+  std::map<std::string_view, std::size_t> place_of;  // a belief from the bus may have very many
+  for (std::size_t i = 0; i < new_names.size(); ++i) place_of.try_emplace(new_names[i], i);
   std::vector<std::size_t> places;
   for (const std::string& name : old_names) {
-    const auto found = std::find(new_names.begin(), new_names.end(), name);
-    if (found == new_names.end()) return std::nullopt;
-    places.push_back(static_cast<std::size_t>(found - new_names.begin()));
+    const auto found = place_of.find(name);
+    if (found == place_of.end()) return std::nullopt;
+    places.push_back(found->second);
   }
   return places;
 }
