@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <mutex>
 #include <string>
 #include <string_view>
@@ -66,6 +67,9 @@ void pass_on(const dds_log_data_t& said) {
 }
 
 void take_from_cyclone(void* /*unused*/, const dds_log_data_t* said) {
+  // Cyclone ends the program after a fatal error, whose line a sink that limits its lines may hold back.
+  if ((said->priority & DDS_LC_FATAL) != 0)
+    std::fprintf(stderr, "Cyclone DDS: %.*s\n", static_cast<int>(said->size), said->message);
   // What a sink makes Cyclone say is not for a sink.
   thread_local bool is_inside = false;
   if (is_inside) return;

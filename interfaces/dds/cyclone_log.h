@@ -8,7 +8,7 @@ namespace prescene::interfaces {
 
 /// While it lives, what Cyclone says of a domain goes to `log`. Of several in a domain the oldest gets it; what is
 /// about another domain, or none, goes to the oldest of all. An empty `log` gets nothing: where there are only such,
-/// Cyclone prints. A sink must not make or end another one.
+/// Cyclone prints. The line of a fatal error is printed, too. A sink must not make or end another one.
 class CycloneLog {
  public:
   CycloneLog(int domain, core::LogSink log);

@@ -541,6 +541,14 @@ TEST(DdsNode, WhatCycloneSaysIsInTheLogOfItsNode) {
   EXPECT_EQ(levels_of(DDS_LC_WARNING, "again", "Cyclone DDS: again"), Levels{kWarning});
 }
 
+TEST(DdsNode, WhyCycloneEndsTheProgramIsPrintedWhateverTheLogDoes) {
+  const auto end_with_a_node = [] {
+    const auto node = DdsNode::create(options(), [](core::LogLevel, const std::string&) {});
+    dds_log(DDS_LC_FATAL, __FILE__, __LINE__, "test", "%s\n", "no way on");
+  };
+  EXPECT_DEATH(end_with_a_node(), "Cyclone DDS: no way on");
+}
+
 TEST(DdsNode, AnnouncesItselfInEitherForm) {
   for (const RosDistro distro : {RosDistro::kHumble, RosDistro::kJazzy}) {
     DdsOptions announced = options();
