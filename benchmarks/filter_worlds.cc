@@ -2,6 +2,7 @@
 #include "benchmarks/filter_worlds.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -99,6 +100,12 @@ void add_pusher(Contacts& contacts, const Vector3d& from, const Vector3d& to, do
 Contacts contacts_of(const std::string& kind, std::uint64_t seed) {
   core::RandomStream draws(seed, core::Purpose::kScenario);
   const auto between = [&](double low, double high) { return draws.uniform(low, high); };
+  // One declaration each, here and below: the order in which arguments are evaluated is the compiler's choice.
+  using Range = std::array<double, 2>;
+  const auto sizes = [&](const Range& along_x, const Range& along_y, const Range& along_z) {
+    const double z = between(along_z[0], along_z[1]), y = between(along_y[0], along_y[1]);
+    return Vector3d(between(along_x[0], along_x[1]), y, z);
+  };
   Contacts contacts;
   contacts.scene.name = kind;
   belief::Support table;
@@ -114,16 +121,16 @@ Contacts contacts_of(const std::string& kind, std::uint64_t seed) {
     return Pose{geometry::exp_rotation(Vector3d(0.0, 0.0, angle)), p};
   };
   if (kind == "stack") {
-    const Vector3d lower(between(0.10, 0.13), between(0.10, 0.13), between(0.06, 0.09));
-    const Vector3d upper(between(0.05, 0.08), between(0.06, 0.09), between(0.07, 0.12));
+    const Vector3d lower = sizes({0.10, 0.13}, {0.10, 0.13}, {0.06, 0.09});
+    const Vector3d upper = sizes({0.05, 0.08}, {0.06, 0.09}, {0.07, 0.12});
     add(contacts, box("lower", lower), turned(between(-0.3, 0.3), {0, 0, 0.5 * lower.z()}));
-    add(contacts, box("upper", upper),
-        turned(between(-0.8, 0.8), {between(-0.015, 0.015), between(-0.015, 0.015), lower.z() + 0.5 * upper.z()}));
+    const double x = between(-0.015, 0.015), y = between(-0.015, 0.015), turn = between(-0.8, 0.8);
+    add(contacts, box("upper", upper), turned(turn, {x, y, lower.z() + 0.5 * upper.z()}));
     const Vector3d from(between(-0.02, 0.02), -0.14, 0.5 * lower.z());
     add_pusher(contacts, from, from + Vector3d(0, speed * (end - begin), 0), begin, end);
   } else if (kind == "leaning") {
-    const Vector3d block(between(0.06, 0.09), between(0.06, 0.09), between(0.09, 0.12));
-    const Vector3d book(between(0.13, 0.16), between(0.02, 0.03), between(0.12, 0.15));
+    const Vector3d block = sizes({0.06, 0.09}, {0.06, 0.09}, {0.09, 0.12});
+    const Vector3d book = sizes({0.13, 0.16}, {0.02, 0.03}, {0.12, 0.15});
     const double lean = between(0.25, 0.4);
     add(contacts, box("block", block, 800.0), turned(0.0, {0, 0, 0.5 * block.z()}));
     // Its upper edge leans on the block's far side: from there on it slides or stays while all settles.
@@ -135,11 +142,11 @@ Contacts contacts_of(const std::string& kind, std::uint64_t seed) {
     const Vector3d from(side * (0.5 * block.x() + 0.04), 0, 0.04);
     add_pusher(contacts, from, from - Vector3d(side * speed * (end - begin), 0, 0), begin, end);
   } else {
-    const Vector3d inner(between(0.07, 0.09), between(0.07, 0.09), between(0.06, 0.09));
-    const Vector3d thing(between(0.03, 0.045), between(0.03, 0.045), between(0.05, 0.10));
+    const Vector3d inner = sizes({0.07, 0.09}, {0.07, 0.09}, {0.06, 0.09});
+    const Vector3d thing = sizes({0.03, 0.045}, {0.03, 0.045}, {0.05, 0.10});
     add(contacts, cup("cup", inner, 0.006), turned(between(-0.3, 0.3), Vector3d::Zero()));
-    add(contacts, box("thing", thing),
-        turned(between(-0.8, 0.8), {between(-0.008, 0.008), between(-0.008, 0.008), 0.007 + 0.5 * thing.z()}));
+    const double x = between(-0.008, 0.008), y = between(-0.008, 0.008), turn = between(-0.8, 0.8);
+    add(contacts, box("thing", thing), turned(turn, {x, y, 0.007 + 0.5 * thing.z()}));
     const Vector3d from(between(-0.015, 0.015), -0.12, 0.04);
     add_pusher(contacts, from, from + Vector3d(0, speed * (end - begin), 0), begin, end);
   }

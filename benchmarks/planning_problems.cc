@@ -78,7 +78,8 @@ PlanningProblem thicket() {
   for (int x = -1; x <= 1; ++x) {
     for (int y = -1; y <= 1; ++y) {
       for (int z = -1; z <= 1; ++z) {
-        const Vector3d turn(random.normal(), random.normal(), random.normal());
+        const double about_z = random.normal(), about_y = random.normal(), about_x = random.normal();
+        const Vector3d turn(about_x, about_y, about_z);
         knots.push_back({"knot", knot, {geometry::exp_rotation(turn), 0.5 * Vector3d(x, y, z)}});
       }
     }

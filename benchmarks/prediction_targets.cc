@@ -39,8 +39,11 @@ std::string line(const char* format, Values... values) {
 std::string random_shape(core::RandomStream& stream, double* height) {
   const double kind = stream.uniform();
   *height = between(stream, 0.03, 0.2);
-  if (kind < 0.5)
-    return line("    box: [%.4f, %.4f, %.4f]", between(stream, 0.03, 0.15), between(stream, 0.03, 0.15), *height);
+  if (kind < 0.5) {
+    // One declaration each: the order in which arguments are evaluated is the compiler's choice.
+    const double depth = between(stream, 0.03, 0.15), width = between(stream, 0.03, 0.15);
+    return line("    box: [%.4f, %.4f, %.4f]", width, depth, *height);
+  }
   if (kind < 0.8) return line("    cylinder: {radius: %.4f, length: %.4f}", between(stream, 0.015, 0.06), *height);
   const double foot = between(stream, 0.02, 0.05);
   return line("    lathe: {profile: [[%.4f, %.4f], [%.4f, %.4f]], segments: 24}", foot, -0.5 * *height,
@@ -63,11 +66,12 @@ std::string random_scene_text(core::RandomStream& stream) {
   std::string text = "name: random\nduration: 4\nmodels:\n" + random_model("thing", stream, &height);
   if (second > 0.5) text += random_model("second", stream, &other_height);
   text += "supports:\n  floor: {ground: {size: 6}, pose: {position: [0, 0, -0.7]}}\n";
+  const double restitution = between(stream, 0.3, 1.0), friction = between(stream, 0.5, 1.0);
+  const double slope = stream.uniform() < 0.3 ? between(stream, -12.0, 12.0) : 0.0;
   text += line(
       "  table: {box: [0.6, 0.8, 0.04], pose: {position: [0, 0, -0.02], rotation: {euler_deg: [%.3f, 0, 0]}}, "
       "friction: %.3f, restitution: %.3f}",
-      stream.uniform() < 0.3 ? between(stream, -12.0, 12.0) : 0.0, between(stream, 0.5, 1.0),
-      between(stream, 0.3, 1.0));
+      slope, friction, restitution);
   const double how = stream.uniform();  // put down, dropped, on its way
   const double x = between(stream, 0.2, 0.32);
   double z = 0.5 * height + 0.002;
@@ -80,11 +84,13 @@ std::string random_scene_text(core::RandomStream& stream) {
   }
   const double tilt = how < 0.3 ? between(stream, 0.0, 4.0) : between(stream, 0.0, 25.0);
   if (how >= 0.3) z += between(stream, 0.01, 0.15);
+  const double turn_sigma_y = between(stream, 0.2, 8.0), turn_sigma_x = between(stream, 0.2, 8.0);
+  const double sigma_y = between(stream, 0.001, 0.02), sigma_x = between(stream, 0.001, 0.02);
+  const double about_z = between(stream, 0.0, 360.0), about_y = between(stream, -tilt, tilt);
   text += line(
       "  thing: {model: thing, pose: {position: [%.4f, 0, %.4f], rotation: {euler_deg: [%.2f, %.2f, %.2f]}, "
       "normal: {position: [%.4f, %.4f, 0.001], rotation_deg: [%.2f, %.2f, 10]}}",
-      x, z, tilt, between(stream, -tilt, tilt), between(stream, 0.0, 360.0), between(stream, 0.001, 0.02),
-      between(stream, 0.001, 0.02), between(stream, 0.2, 8.0), between(stream, 0.2, 8.0));
+      x, z, tilt, about_y, about_z, sigma_x, sigma_y, turn_sigma_x, turn_sigma_y);
   text.pop_back();
   if (how >= 0.65)
     text += line(", velocity: [{normal: [%.3f, 0.1]}, {normal: [0, 0.1]}, 0]", between(stream, 0.1, 0.8));

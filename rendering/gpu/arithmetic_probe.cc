@@ -46,7 +46,8 @@ std::vector<Inputs> probe_inputs() {
   std::vector<Inputs> inputs(kNumbers);
   for (std::size_t i = 0; i < kNumbers; ++i) {
     for (float& value : inputs[i]) {
-      double number = std::ldexp(stream.uniform(1.0, 2.0), static_cast<int>(stream.uniform(-10.0, 10.0)));
+      const int order = static_cast<int>(stream.uniform(-10.0, 10.0));
+      double number = std::ldexp(stream.uniform(1.0, 2.0), order);
       if (stream.uniform() < 0.125) {
         number = std::ldexp(1.0, static_cast<int>(stream.uniform(-10.0, 10.0)));
         number *= 1.0 + std::ldexp(std::floor(stream.uniform(-2.0, 3.0)), -23);

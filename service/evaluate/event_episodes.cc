@@ -29,8 +29,9 @@ Setting put_things(SceneWriter& w, std::uint64_t seed, std::size_t count, double
     const std::string name = "thing_" + std::to_string(i);
     setting.things.push_back(everyday_thing(w, name, seed + 2 * i + seed / 6));
     const double x = 0.2 * (static_cast<double>(i) - 0.5 * static_cast<double>(count - 1));
-    setting.places.emplace_back(x + w.between(-0.02, 0.02), y_middle + w.between(-0.04, 0.04),
-                                setting.things.back().height);
+    // One declaration each: the order in which arguments are evaluated is the compiler's choice.
+    const double off_y = w.between(-0.04, 0.04), off_x = w.between(-0.02, 0.02);
+    setting.places.emplace_back(x + off_x, y_middle + off_y, setting.things.back().height);
     w.object(name, name, setting.places.back(), {0, 0, w.between(-90, 90)});
   }
   w.camera_at({0.0, y_middle, 0.06});
@@ -86,7 +87,8 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
   if (kind == "slipped") {
     table(w);
     const Thing thing = everyday_thing(w, "thing_0", seed);
-    const Vector3d p(w.between(-0.05, 0.05), w.between(-0.05, 0.05), w.between(0.06, 0.14) + thing.height);
+    const double height = w.between(0.06, 0.14), y = w.between(-0.05, 0.05);
+    const Vector3d p(w.between(-0.05, 0.05), y, height + thing.height);
     // A hand with the fingers a little apart, so that nothing is held by accident.
     w.hand("gripper", kGripper, {{p + Vector3d(0, 0, thing.height + thing.top + 0.06), Vector3d::Zero()}}, {0.0});
     w.object("thing_0", "thing_0", p, {0, 0, w.between(-60, 60)}, ", held_by: gripper");
@@ -106,8 +108,9 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
         "symmetry: {axis: z, continuous: true, flip: true}";
     w.model("red_can", shape + ", color: '#c03020'");
     w.model("blue_can", shape + ", color: '#2040c0'");
-    const Vector3d red(w.between(-0.14, -0.08), w.between(-0.05, 0.05), 0.055);
-    const Vector3d blue(w.between(0.08, 0.14), w.between(-0.05, 0.05), 0.055);
+    const double red_y = w.between(-0.05, 0.05), red_x = w.between(-0.14, -0.08);
+    const double blue_y = w.between(-0.05, 0.05), blue_x = w.between(0.08, 0.14);
+    const Vector3d red(red_x, red_y, 0.055), blue(blue_x, blue_y, 0.055);
     w.object("red", "red_can", red, Vector3d::Zero());
     w.object("blue", "blue_can", blue, Vector3d::Zero());
     w.camera_at({0.0, 0.0, 0.06});
@@ -139,7 +142,8 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
                 ", density: 500, friction: {normal: [0.5, 0.08], min: 0.1}, symmetry: cuboid, color: '#3060c0'");
     const Thing tower{"thing_0", 0.5 * h, 0.5 * std::hypot(0.055, 0.07)};
     const Thing other = everyday_thing(w, "thing_1", seed + 1);
-    const Vector3d place(w.between(-0.06, 0.0), w.between(-0.05, 0.05), 0.5 * h);
+    const double y = w.between(-0.05, 0.05), x = w.between(-0.06, 0.0);
+    const Vector3d place(x, y, 0.5 * h);
     w.object("thing_0", "thing_0", place, {0, 0, w.between(-90, 90)});
     w.object("thing_1", "thing_1", {0.30, 0.16, other.height}, {0, 0, w.between(-60, 60)});
     w.camera_at({0.05, 0.0, 0.07});
@@ -147,7 +151,8 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
     episode.object = "thing_0";
     if (kind == "pushed_over") {
       episode.truth = EventKind::kPushed;
-      push(w, place, tower, w.between(0.75, 0.92) * h, direction, w.between(0.07, 0.12), w.between(0.15, 0.4), episode);
+      const double speed = w.between(0.15, 0.4), length = w.between(0.07, 0.12), height = w.between(0.75, 0.92) * h;
+      push(w, place, tower, height, direction, length, speed, episode);
     } else {
       episode.truth = EventKind::kBumped;
       episode.direction = direction;
@@ -168,11 +173,13 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
   episode.object = thing.name;
   if (kind == "pushed") {
     episode.truth = EventKind::kPushed;
-    push(w, place, thing, w.between(0.15, 0.35) * top, direction, w.between(0.05, 0.12), w.between(0.12, 0.4), episode);
+    const double speed = w.between(0.12, 0.4), length = w.between(0.05, 0.12), height = w.between(0.15, 0.35) * top;
+    push(w, place, thing, height, direction, length, speed, episode);
   } else if (kind == "pushed_off") {
     episode.truth = EventKind::kPushed;
-    push(w, place, thing, w.between(0.15, 0.35) * top, -0.5 * std::numbers::pi + w.between(-0.3, 0.3),
-         w.between(0.18, 0.25), w.between(0.3, 0.5), episode);
+    const double speed = w.between(0.3, 0.5), length = w.between(0.18, 0.25);
+    const double off = -0.5 * std::numbers::pi + w.between(-0.3, 0.3), height = w.between(0.15, 0.35) * top;
+    push(w, place, thing, height, off, length, speed, episode);
   } else if (kind == "bumped") {
     episode.truth = EventKind::kBumped;
     episode.direction = direction;
@@ -187,9 +194,10 @@ EventEpisode make_event_episode(const std::string& kind, std::uint64_t seed) {
     episode.changes = {{episode.time, thing.name, {}, {}}};
   } else {
     episode.truth = EventKind::kMoved;
-    geometry::Pose X_WO = geometry::Pose::from_translation(
-        {place.x() + w.between(-0.05, 0.05),
-         place.y() + (w.between(0.0, 1.0) < 0.5 ? -1.0 : 1.0) * w.between(0.12, 0.2), thing.height + 0.001});
+    const double x = place.x() + w.between(-0.05, 0.05);
+    const double side = w.between(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
+    const double y = place.y() + side * w.between(0.12, 0.2);
+    geometry::Pose X_WO = geometry::Pose::from_translation({x, y, thing.height + 0.001});
     X_WO.rotation = geometry::exp_rotation({0.0, 0.0, w.between(-1.5, 1.5)});
     episode.changes = {{episode.time, thing.name, {}, {}}, {episode.time + w.between(0.2, 0.5), thing.name, X_WO, {}}};
   }

@@ -98,7 +98,8 @@ inline Thing everyday_thing(SceneWriter& w, const std::string& name, std::uint64
       return {name, 0.5 * h, r, 0.5 * h};
     }
     case 2: {
-      const geometry::Vector3d size(w.about(0.09, 0.15), w.about(0.06, 0.15), w.about(0.14, 0.15));
+      const double height = w.about(0.14, 0.15), depth = w.about(0.06, 0.15);
+      const geometry::Vector3d size(w.about(0.09, 0.15), depth, height);
       w.model(name, "box: " + list(size) + contact + ", symmetry: cuboid, color: '#3060c0'");
       return {name, 0.5 * size.z(), 0.5 * std::hypot(size.x(), size.y()), 0.5 * size.z()};
     }
@@ -114,7 +115,8 @@ inline Thing everyday_thing(SceneWriter& w, const std::string& name, std::uint64
       return {name, 0.5 * h, r + 0.028, 0.5 * h};
     }
     case 4: {
-      const geometry::Vector3d size(w.about(0.15, 0.1), w.about(0.10, 0.1), w.about(0.04, 0.15));
+      const double height = w.about(0.04, 0.15), depth = w.about(0.10, 0.1);
+      const geometry::Vector3d size(w.about(0.15, 0.1), depth, height);
       w.model(name, "box: " + list(size) + contact + ", symmetry: cuboid, color: '#d0b040'");
       return {name, 0.5 * size.z(), 0.5 * std::hypot(size.x(), size.y()), 0.5 * size.z()};
     }

@@ -74,7 +74,8 @@ Room furnish(core::RandomStream& draws) {
   room.supports = room.has_floor ? 1 : 0;
   std::vector<Furniture> row;
   while (room.supports < wanted) {
-    const Vector2d size(draws.uniform(0.35, 0.55), draws.uniform(0.30, 0.50));
+    const double depth = draws.uniform(0.30, 0.50);
+    const Vector2d size(draws.uniform(0.35, 0.55), depth);
     const double height = draws.uniform(0.12, 0.75);
     const double kind = draws.uniform();
     const std::string number = std::to_string(row.size() + 1);

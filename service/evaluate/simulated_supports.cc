@@ -74,7 +74,8 @@ class Layout {
   bool put(const ThingKind& kind, core::RandomStream& draws) {
     for (int attempt = 0; attempt < kTries; ++attempt) {
       const RoomPlace place = draws.uniform() < 1.0 / 6.0 ? top_of_a_thing(draws) : any_place(draws);
-      const Vector2d at(draws.uniform(-place.half.x(), place.half.x()), draws.uniform(-place.half.y(), place.half.y()));
+      const double y = draws.uniform(-place.half.y(), place.half.y());
+      const Vector2d at(draws.uniform(-place.half.x(), place.half.x()), y);
       const bool on_thing = place.name.rfind("on ", 0) == 0;
       if (put_at(kind, place, at, on_thing, draws)) return true;
     }
@@ -91,8 +92,8 @@ class Layout {
         const Vector2d towards = (p_WC - hidden.X_WO.translation).head<2>().normalized();
         const Vector2d aside(-towards.y(), towards.x());
         for (int attempt = 0; attempt < kTries; ++attempt) {
-          const Vector2d at_W = hidden.X_WO.translation.head<2>() + draws.uniform(0.05, 0.2) * towards +
-                                draws.uniform(-0.06, 0.06) * aside;
+          const double beside = draws.uniform(-0.06, 0.06), before = draws.uniform(0.05, 0.2);
+          const Vector2d at_W = hidden.X_WO.translation.head<2>() + before * towards + beside * aside;
           const Vector3d at = place.X_WP.inverse() * Vector3d(at_W.x(), at_W.y(), place.X_WP.translation.z());
           if (put_at(kind, place, at.head<2>(), false, draws)) return true;
         }
@@ -124,9 +125,9 @@ class Layout {
     Placed placed;
     placed.kind = kind;
     placed.stands_on = place.name;
-    placed.X_WO.rotation = (geometry::exp_rotation(draws.uniform(-kHalfTurn, kHalfTurn) * Vector3d::UnitZ()) *
-                            kind.lying[draws.uniform_below(kind.lying.size())])
-                               .normalized();
+    const geometry::Quaterniond& lies = kind.lying[draws.uniform_below(kind.lying.size())];
+    const double turn = draws.uniform(-kHalfTurn, kHalfTurn);
+    placed.X_WO.rotation = (geometry::exp_rotation(turn * Vector3d::UnitZ()) * lies).normalized();
     geometry::Box box;
     for (const Vector3d& vertex : kind.mesh.vertices) box.extend(placed.X_WO * vertex);
     if (box.sizes().z() > place.headroom) return false;
@@ -199,7 +200,8 @@ core::Result<SupportsFrame> simulate_supports(std::uint64_t number, rendering::R
   const double elevation = draws.uniform(25.0, 55.0) * kHalfTurn / 180.0;
   const double azimuth = draws.uniform(-0.7, 0.7) - 0.5 * kHalfTurn;  // the row's front faces -y
   const double distance = draws.uniform(0.95, 1.45);
-  const Vector3d target(draws.uniform(-0.1, 0.1), draws.uniform(-0.1, 0.1), room.middle_height + 0.05);
+  const double target_y = draws.uniform(-0.1, 0.1), target_x = draws.uniform(-0.1, 0.1);
+  const Vector3d target(target_x, target_y, room.middle_height + 0.05);
   const Vector3d p_WC = target + distance * Vector3d(std::cos(elevation) * std::cos(azimuth),
                                                      std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
   SupportsFrame frame;

@@ -48,7 +48,8 @@ Pose lying(const rendering::RenderMesh& mesh, core::RandomStream& stream) {
 /// A box between object and camera, beside the line of sight as often as on it.
 rendering::RenderInstance unknown_box(const Vector3d& towards_camera, double object_radius,
                                       core::RandomStream& stream) {
-  const Vector3d size(stream.uniform(0.04, 0.10), stream.uniform(0.04, 0.10), stream.uniform(0.05, 0.12));
+  const double height = stream.uniform(0.05, 0.12), depth = stream.uniform(0.04, 0.10);
+  const Vector3d size(stream.uniform(0.04, 0.10), depth, height);
   const Vector3d ahead = Vector3d(towards_camera.x(), towards_camera.y(), 0.0).normalized();
   const Vector3d aside = ahead.cross(Vector3d::UnitZ());
   const double gap = object_radius + 0.5 * std::hypot(size.x(), size.y()) + stream.uniform(0.0, 0.05);

@@ -28,7 +28,9 @@ void wander(Writer& w, const Vector3d& p, double begin, double end, Path& path) 
   Vector3d at = p, euler = Vector3d::Zero();
   for (double t = begin; t < end;) {
     const double step = w.between(0.5, 0.8);
-    const Vector3d goal = home + Vector3d(w.between(-0.15, 0.15), w.between(-0.12, 0.12), w.between(-0.06, 0.10));
+    // One declaration each: the order in which arguments are evaluated is the compiler's choice.
+    const double z = w.between(-0.06, 0.10), y = w.between(-0.12, 0.12), x = w.between(-0.15, 0.15);
+    const Vector3d goal = home + Vector3d(x, y, z);
     Vector3d move = goal - at;
     move *= std::min(1.0, 0.3 * step / move.norm());
     at += move;
@@ -49,7 +51,8 @@ void carry(Writer& w, const std::string& hand, const Vector3d& p, double begin, 
 SuiteScene in_hand(Writer& w, std::uint64_t seed) {
   table(w);
   const Thing thing = everyday_thing(w, "thing", seed);
-  const Vector3d p(w.between(-0.05, 0.05), w.between(-0.05, 0.05), 0.10);
+  const double y = w.between(-0.05, 0.05), x = w.between(-0.05, 0.05);
+  const Vector3d p(x, y, 0.10);
   // Between the fingers, below the palm.
   const double grip = std::max(0.03, thing.top - (kPalmHeight - 0.005));
   carry(w, "gripper", p + Vector3d(0, 0, thing.height + grip), 0.3, 3.0);
@@ -86,8 +89,8 @@ SuiteScene drawer(Writer& w, std::uint64_t) {
   const double side = w.about(0.05, 0.15);
   w.model("block", "box: " + list({side, 1.3 * side, 0.9 * side}) +
                        ", density: 500, friction: 0.5, symmetry: cuboid, color: '#d04040'");
-  w.object("block", "block", {w.between(-0.08, 0.08), w.between(-0.10, 0.0), 0.021 + 0.45 * side},
-           {0, 0, w.between(-40, 40)});
+  const double turn = w.between(-40, 40), x = w.between(-0.08, 0.08), y = w.between(-0.10, 0.0);
+  w.object("block", "block", {x, y, 0.021 + 0.45 * side}, {0, 0, turn});
   w.camera_at({0.0, -0.02, 0.05});
   return {w.text("drawer", 3.4, true), w.text("drawer", 3.4, true), {}, true};
 }
@@ -100,8 +103,9 @@ SuiteScene tipped(Writer& w, std::uint64_t seed) {
   const Thing other = everyday_thing(w, "other", seed + 1);
   w.object("tower", "tower", {-0.05, 0.0, 0.5 * h}, {0, 0, w.between(-15, 15)});
   w.object("other", "other", {0.30, 0.16, other.height}, {0, 0, w.between(-60, 60)});
-  w.action(0.3, "push: {from: [-0.16, 0, " + number(0.8 * h) + "], to: [0.08, " + number(w.between(-0.01, 0.01)) +
-                    ", " + number(0.8 * h) + "], duration: " + number(w.between(1.2, 1.8)) + "}");
+  const double lasts = w.between(1.2, 1.8), to_y = w.between(-0.01, 0.01);
+  w.action(0.3, "push: {from: [-0.16, 0, " + number(0.8 * h) + "], to: [0.08, " + number(to_y) + ", " +
+                    number(0.8 * h) + "], duration: " + number(lasts) + "}");
   w.camera_at({0.05, 0.0, 0.07});
   return {w.text("tipped", 2.6, true), w.text("tipped", 2.6, true), {}, true};
 }
@@ -113,8 +117,9 @@ SuiteScene twins(Writer& w, std::uint64_t) {
       "symmetry: {axis: z, continuous: true, flip: true}";
   w.model("red_can", shape + ", color: '#c03020'");
   w.model("blue_can", shape + ", color: '#2040c0'");
-  const Vector3d red(w.between(-0.12, -0.08), w.between(-0.03, 0.03), 0.055);
-  const Vector3d blue(w.between(0.08, 0.12), w.between(-0.03, 0.03), 0.055);
+  const double red_y = w.between(-0.03, 0.03), red_x = w.between(-0.12, -0.08);
+  const double blue_y = w.between(-0.03, 0.03), blue_x = w.between(0.08, 0.12);
+  const Vector3d red(red_x, red_y, 0.055), blue(blue_x, blue_y, 0.055);
   w.object("red", "red_can", red, Vector3d::Zero());
   w.object("blue", "blue_can", blue, Vector3d::Zero());
   w.camera = "  fov_deg: 58\n  look: {from: [0.0, -0.8, 0.45], at: [0.0, 0.0, 0.05]}\n";
@@ -138,9 +143,8 @@ SuiteScene taken_away(Writer& w, std::uint64_t seed) {
   for (std::uint64_t i = 0; i < 3; ++i) {
     const std::string name = "thing_" + std::to_string(i);
     const Thing thing = everyday_thing(w, name, seed + 2 * i);
-    w.object(name, name,
-             {-0.18 + 0.18 * static_cast<double>(i) + w.between(-0.02, 0.02), w.between(-0.08, 0.08), thing.height},
-             {0, 0, w.between(-90, 90)});
+    const double turn = w.between(-90, 90), off_x = w.between(-0.02, 0.02), y = w.between(-0.08, 0.08);
+    w.object(name, name, {-0.18 + 0.18 * static_cast<double>(i) + off_x, y, thing.height}, {0, 0, turn});
   }
   w.camera_at({0.0, 0.0, 0.06});
   return {w.text("taken_away", 2.5, true),
@@ -153,7 +157,8 @@ SuiteScene put_in(Writer& w, std::uint64_t seed) {
   table(w);
   const Thing there = everyday_thing(w, "there", seed);
   const Thing comes = everyday_thing(w, "comes", seed + 3);
-  w.object("there", "there", {-0.12, w.between(-0.06, 0.06), there.height}, {0, 0, w.between(-90, 90)});
+  const double turn = w.between(-90, 90), y = w.between(-0.06, 0.06);
+  w.object("there", "there", {-0.12, y, there.height}, {0, 0, turn});
   w.objects += "  comes: {model: comes, pose: {position: {uniform: {from: [-0.3, -0.2, " + number(comes.height) +
                "], to: [0.3, 0.2, " + number(comes.height) + "]}}}}\n";
   w.camera_at({0.0, 0.0, 0.06});
@@ -172,10 +177,8 @@ SuiteScene clutter(Writer& w, std::uint64_t seed) {
     const std::string name = "thing_" + std::to_string(i);
     const Thing thing = everyday_thing(w, name, seed + i);
     const double column = static_cast<double>(i % 4), row = static_cast<double>(i / 4);
-    w.object(
-        name, name,
-        {-0.30 + 0.20 * column + w.between(-0.012, 0.012), -0.18 + 0.20 * row + w.between(-0.012, 0.012), thing.height},
-        {0, 0, w.between(-90, 90)});
+    const double turn = w.between(-90, 90), off_x = w.between(-0.012, 0.012), off_y = w.between(-0.012, 0.012);
+    w.object(name, name, {-0.30 + 0.20 * column + off_x, -0.18 + 0.20 * row + off_y, thing.height}, {0, 0, turn});
   }
   w.action(0.4, "push: {from: [-0.45, -0.18, 0.05], to: [-0.24, -0.16, 0.05], duration: 1.2}");
   w.camera = "  fov_deg: 58\n  look: {from: [" + number(w.between(-0.1, 0.1)) + ", -0.95, 0.75], at: [0, 0, 0.03]}\n";
@@ -186,7 +189,8 @@ SuiteScene unknown_hand(Writer& w, std::uint64_t seed) {
   table(w);
   const Thing mug = everyday_thing(w, "mug", 3);
   const Thing other = everyday_thing(w, "other", seed + 1);
-  const Vector3d p(w.between(-0.08, 0.0), w.between(-0.05, 0.05), mug.height);
+  const double y = w.between(-0.05, 0.05), x = w.between(-0.08, 0.0);
+  const Vector3d p(x, y, mug.height);
   w.object("mug", "mug", p, {0, 0, w.between(-90, 90)});
   w.object("other", "other", {0.24, 0.16, other.height}, {0, 0, w.between(-60, 60)});
   w.camera_at(p + Vector3d(0, 0, 0.12));
@@ -203,7 +207,8 @@ SuiteScene unknown_hand(Writer& w, std::uint64_t seed) {
 
 SuiteScene thin(Writer& w, std::uint64_t) {
   table(w);
-  w.model("marker", "cylinder: {radius: " + number(w.about(0.009, 0.1)) + ", length: " + number(w.about(0.135, 0.1)) +
+  const double length = w.about(0.135, 0.1), radius = w.about(0.009, 0.1);
+  w.model("marker", "cylinder: {radius: " + number(radius) + ", length: " + number(length) +
                         "}, density: 700, friction: 0.4, symmetry: {axis: z, continuous: true, flip: true}, color: "
                         "'#202020'");
   w.model("scissors",
@@ -211,10 +216,12 @@ SuiteScene thin(Writer& w, std::uint64_t) {
           "rotation: {euler_deg: [0, 0, -12]}}, {box: [0.05, 0.045, 0.010], position: [0.026, -0.09, 0]}, {box: [0.05, "
           "0.045, 0.010], position: [-0.026, -0.09, 0]}], density: 2500, friction: 0.4, symmetry: {axis: y, order: 2}, "
           "color: '#c04080'");
-  const Vector3d p(w.between(-0.15, -0.1), w.between(-0.05, 0.05), 0.12);
+  const double y = w.between(-0.05, 0.05), x = w.between(-0.15, -0.1);
+  const Vector3d p(x, y, 0.12);
   carry(w, "gripper", p + Vector3d(0, 0, 0.03), 0.3, 3.0);
   w.object("marker", "marker", p, {0, 90, w.between(-30, 30)}, ", held_by: gripper");
-  w.object("scissors", "scissors", {0.16, w.between(-0.04, 0.04), 0.005}, {0, 0, w.between(-60, 60)});
+  const double turn = w.between(-60, 60), scissors_y = w.between(-0.04, 0.04);
+  w.object("scissors", "scissors", {0.16, scissors_y, 0.005}, {0, 0, turn});
   w.action(0.6, "push: {from: [0.33, 0.02, 0.012], to: [0.14, 0.0, 0.012], duration: 1.6, radius: 0.01}");
   w.camera_at({0.0, 0.0, 0.10});
   return {w.text("thin", 3.0, true), w.text("thin", 3.0, true), {}, true};
@@ -228,7 +235,8 @@ SuiteScene bottle(Writer& w, std::uint64_t seed) {
                         "]], segments: 32, use: convex_hull}, density: 400, friction: 0.4, symmetry: {axis: z, "
                         "continuous: true}, surface: transparent, color: '#a0c0d0'");
   const Thing other = everyday_thing(w, "other", seed + 2);
-  const Vector3d p(w.between(-0.05, 0.05), w.between(-0.05, 0.05), 0.08);
+  const double y = w.between(-0.05, 0.05), x = w.between(-0.05, 0.05);
+  const Vector3d p(x, y, 0.08);
   carry(w, "gripper", p + Vector3d(0, 0, h), 0.3, 3.0);
   w.object("bottle", "bottle", p, {0, 0, 0}, ", held_by: gripper");
   w.object("other", "other", {0.26, 0.14, other.height}, {0, 0, w.between(-60, 60)});

@@ -55,7 +55,9 @@ class Imagination {
     } else {
       const int blocks = 1 + static_cast<int>(draws_.uniform_below(3));
       for (int i = 0; i < blocks; ++i) {
-        const Vector3d size(draws_.uniform(0.3, 0.8), draws_.uniform(0.3, 0.6), draws_.uniform(0.1, 0.75));
+        // One declaration each: the order in which arguments are evaluated is the compiler's choice.
+        const double height = draws_.uniform(0.1, 0.75), depth = draws_.uniform(0.3, 0.6);
+        const Vector3d size(draws_.uniform(0.3, 0.8), depth, height);
         const Vector3d at(0.7 * (i - 0.5 * (blocks - 1)), draws_.uniform(-0.15, 0.15), 0.5 * size.z());
         add_box("block_" + std::to_string(i + 1), size, at, draws_.uniform(-0.3, 0.3));
       }
@@ -80,7 +82,8 @@ class Imagination {
       const double elevation = draws_.uniform(18.0, 65.0) * kHalfTurn / 180.0,
                    azimuth = draws_.uniform(-0.9, 0.9) - 0.5 * kHalfTurn;
       const double distance = draws_.uniform(0.65, 1.45);
-      const Vector3d target = focus_ + Vector3d(draws_.uniform(-0.12, 0.12), draws_.uniform(-0.12, 0.12), 0.05);
+      const double target_y = draws_.uniform(-0.12, 0.12), target_x = draws_.uniform(-0.12, 0.12);
+      const Vector3d target = focus_ + Vector3d(target_x, target_y, 0.05);
       const Vector3d towards(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                              std::sin(elevation));
       camera.X_WC = {geometry::Quaterniond(geometry::level_camera(-towards)).normalized(), target + distance * towards};
@@ -100,7 +103,10 @@ class Imagination {
     }
     known_ = world_.objects.size();
     const auto unknown = draws_.uniform_below(5);
-    for (std::uint64_t i = 0; i < unknown; ++i) put(add_unknown_model(), known_ > 0 && draws_.uniform() < 0.5);
+    for (std::uint64_t i = 0; i < unknown; ++i) {
+      const bool in_front = known_ > 0 && draws_.uniform() < 0.5;
+      put(add_unknown_model(), in_front);
+    }
   }
 
   core::Status settle(Backends& backends, const core::RandomStream& stream) {
@@ -162,10 +168,15 @@ class Imagination {
     return {box.center().x() + draws_.uniform(-x, x), box.center().y() + draws_.uniform(-y, y), box.max().z()};
   }
 
+  Vector3d near_focus() {
+    const double y = draws_.uniform(-1.0, 1.0), x = draws_.uniform(-1.0, 1.0);
+    return focus_ + kPuttingReach * Vector3d(x, y, 0.0);
+  }
+
   int add_unknown_model() {
     const double kind = draws_.uniform();
-    geometry::Primitive shape =
-        BoxShape{Vector3d(draws_.uniform(0.03, 0.16), draws_.uniform(0.03, 0.16), draws_.uniform(0.03, 0.2))};
+    const double height = draws_.uniform(0.03, 0.2), depth = draws_.uniform(0.03, 0.16);
+    geometry::Primitive shape = BoxShape{Vector3d(draws_.uniform(0.03, 0.16), depth, height)};
     if (kind > 0.6) shape = geometry::Cylinder{draws_.uniform(0.02, 0.06), draws_.uniform(0.04, 0.2)};
     if (kind > 0.85) shape = geometry::Sphere{draws_.uniform(0.025, 0.06)};
     if (kind > 0.93) shape = geometry::Cone{draws_.uniform(0.03, 0.06), draws_.uniform(0.06, 0.16)};
@@ -190,7 +201,7 @@ class Imagination {
     const geometry::TriangleMesh mesh = thing.visual ? *thing.visual : belief::collision_mesh(thing);
     geometry::Box box;
     for (const Vector3d& vertex : mesh.vertices) box.extend(X_UO.rotation * vertex);
-    Vector3d at = focus_ + kPuttingReach * Vector3d(draws_.uniform(-1.0, 1.0), draws_.uniform(-1.0, 1.0), 0.0);
+    Vector3d at = near_focus();
     if (draws_.uniform() < 0.25) {
       at = top_of(world_.supports[draws_.uniform_below(world_.supports.size())]);
       if (at.z() > world_.camera->X_WC.translation.z()) at = focus_;
@@ -199,15 +210,15 @@ class Imagination {
       const Placed& hidden = placed_[draws_.uniform_below(known_)];
       Vector3d towards = world_.camera->X_WC.translation - hidden.at;
       towards.z() = 0.0;
-      at = hidden.at + draws_.uniform(0.05, 0.2) * towards.normalized() +
-           0.05 * Vector3d(draws_.normal(), draws_.normal(), 0.0);
+      const double off_y = draws_.normal(), off_x = draws_.normal(), along = draws_.uniform(0.05, 0.2);
+      at = hidden.at + along * towards.normalized() + 0.05 * Vector3d(off_x, off_y, 0.0);
       at.z() = hidden.ground;
     }
     const double radius = 0.5 * std::hypot(box.sizes().x(), box.sizes().y());
     const double ground = at.z();
     const bool stacks = draws_.uniform() < 0.25;
     for (int attempt = 0; attempt < 20 && !stacks && !in_front && touches(at, radius); ++attempt) {
-      at = focus_ + kPuttingReach * Vector3d(draws_.uniform(-1.0, 1.0), draws_.uniform(-1.0, 1.0), 0.0);
+      at = near_focus();
       at.z() = ground;
     }
     for (const Placed& other : placed_)
