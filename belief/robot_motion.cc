@@ -125,7 +125,7 @@ class Plan {
     const Pose X_WG = pose_of(*object.hand, time);
     Body& body = bodies_[static_cast<std::size_t>(*object.hand)];
     if (body.object == index && time < body.until) {
-      body.carries = [X_WG](double) { return X_WG; };
+      body.carries = [X_WG](double) { return Pose(X_WG); };
       body.shifts.clear();
       body.until = time;
     }
