@@ -27,8 +27,8 @@ FreeFall measure_fall(std::span<const TimedPose> frames, const geometry::Vector3
 FreeFall measure_whole_fall(std::span<const TimedPose> frames, const geometry::Vector3d& center_of_mass,
                             const geometry::Vector3d& gravity_W, double position_noise);
 
-/// Noise of a recorded coordinate, m: from the median third difference, which smooth motion hardly has. 0 where no
-/// recording has four frames.
+/// Noise of a recorded coordinate, m: from the median third difference, which smooth motion hardly has, of frames that
+/// do not repeat the one before. 0 where no recording has four frames.
 double position_noise_of(std::span<const std::span<const TimedPose>> recordings);
 
 }  // namespace prescene::simulation
