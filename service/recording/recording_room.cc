@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <set>
 #include <system_error>
 
 #include "prescene/interfaces/mcap/mcap_reader.h"
@@ -113,19 +112,24 @@ std::vector<RemovedFile> RecordingRoom::make_room(const std::vector<std::filesys
   }
   const std::size_t of_others = files.size();
   std::uint64_t sum = 0;
+  std::erase_if(gone_, [&own](const std::filesystem::path& file) {
+    return std::find(own.begin(), own.end(), file) == own.end();
+  });
   for (const std::filesystem::path& file : own) {
+    if (gone_.contains(file)) continue;
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(file, error);
     files.push_back({file, error ? 0 : bytes, {}});
   }
   for (const Earlier& file : files) sum += file.bytes;
-  const std::size_t stay = std::min<std::size_t>(own.size(), 2);
+  const std::size_t stay = std::min<std::size_t>(files.size() - of_others, 2);
   std::vector<RemovedFile> removed;
   for (std::size_t i = 0; i + stay < files.size() && sum > keep_bytes_; ++i) {
     std::error_code error;
     // One of this run that was moved away is gone, whatever is in its place.
     if (i < of_others || is_own(files[i].file)) std::filesystem::remove(files[i].file, error);
     if (!error) sum -= files[i].bytes;
+    if (!error && i >= of_others) gone_.insert(files[i].file);
     known_.erase(files[i].file);
     removed.push_back(
         {files[i].file, error ? files[i].file.string() + " can't be removed: " + error.message() : std::string()});

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -78,6 +79,7 @@ class RecordingRoom {
       : folder_(std::move(folder)), part_(std::move(part)), keep_bytes_(keep_bytes) {}
   /// Removes the oldest files while all take more: first those of earlier runs, by when they were written last, but for
   /// runs that another program goes on with; then those of this one (`own`, oldest first), but for its newest two.
+  /// Each that is gone is told once, also where the next `own` was put together before that was known.
   std::vector<RemovedFile> make_room(const std::vector<std::filesystem::path>& own);
 
  private:
@@ -102,6 +104,7 @@ class RecordingRoom {
     std::string series;
   };
   std::map<std::filesystem::path, Known> known_;  // so that each is opened once
+  std::set<std::filesystem::path> gone_;          // own files that were told to be gone, while `own` still names them
 };
 
 }  // namespace prescene::service
