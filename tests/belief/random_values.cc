@@ -236,7 +236,8 @@ Query random_query(RandomStream& stream) {
         achieve.free = {{"offset", -stream.uniform(), stream.uniform()}, {"direction", {}, {}}};
       if (random_below(stream, 2) == 1) achieve.fixed = {{"height", stream.uniform()}};
       achieve.errors.position = random_vector(stream, 1.0).cwiseAbs();
-      achieve.errors.rotation = geometry::kDegree * Vector3d(stream.uniform(), stream.uniform(), stream.uniform());
+      const double about_z = stream.uniform(), about_y = stream.uniform(), about_x = stream.uniform();
+      achieve.errors.rotation = geometry::kDegree * Vector3d(about_x, about_y, about_z);
       achieve.errors.delay = UniformScalar{0.0, stream.uniform()};
       if (random_below(stream, 2) == 1) achieve.errors.disturbance.emplace();
       achieve.probability = stream.uniform(0.5, 0.99);

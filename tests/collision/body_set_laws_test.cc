@@ -29,7 +29,8 @@ Pose random_pose(core::RandomStream& random, double reach) {
   Pose X;
   const auto draw = [&] { return random.uniform(-1.0, 1.0); };
   X.rotation = geometry::exp_rotation({3.0 * draw(), 3.0 * draw(), 3.0 * draw()});
-  X.translation = reach * geometry::Vector3d(draw(), draw(), draw());
+  const double z = draw(), y = draw(), x = draw();
+  X.translation = reach * geometry::Vector3d(x, y, z);
   return X;
 }
 

@@ -340,7 +340,10 @@ TEST_P(ContinuousQueries, FindTheSameTimesAtEveryScale) {
   };
   for (int i = 0; i < 10; ++i) {
     const auto unit = [&] { return 2.0 * random.uniform() - 1.0; };
-    const auto rotation = [&] { return geometry::Quaterniond(2.0, unit(), unit(), unit()).normalized(); };
+    const auto rotation = [&] {
+      const double z = unit(), y = unit(), x = unit();
+      return geometry::Quaterniond(2.0, x, y, z).normalized();
+    };
     const Pose start{rotation(), {0.4, 0.05 * unit(), 0.05 * unit()}};
     const Pose end{rotation(), {-0.4, 0.05 * unit(), 0.05 * unit()}};
     const FirstContact expected = contact_at(1.0, start, end);

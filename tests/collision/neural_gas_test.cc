@@ -24,9 +24,9 @@ TEST(NeuralGas, FindsClustersThatAxesCannotSeparate) {
     const std::size_t cluster = i % 5;  // A cross of five.
     const float x = cluster == 1 ? 1.0F : cluster == 2 ? -1.0F : 0.0F;
     const float y = cluster == 3 ? 1.0F : cluster == 4 ? -1.0F : 0.0F;
-    items.push_back(point(x + 0.2F * static_cast<float>(random.normal()),
-                          y + 0.2F * static_cast<float>(random.normal()), 0.2F * static_cast<float>(random.normal()),
-                          1.0F));
+    const auto off_z = static_cast<float>(random.normal()), off_y = static_cast<float>(random.normal()),
+               off_x = static_cast<float>(random.normal());
+    items.push_back(point(x + 0.2F * off_x, y + 0.2F * off_y, 0.2F * off_z, 1.0F));
   }
   core::ThreadPool pool(2);
   const Hierarchy tree = build_hierarchy(items, {.builder = Builder::kNeuralGas, .branching = 5}, pool);
@@ -66,8 +66,10 @@ TEST(NeuralGas, IsTheSameForEveryInstructionSet) {
   core::RandomStream random(3, core::Purpose::kTest);
   std::vector<Item> items;
   for (int i = 0; i < 3000; ++i) {
-    items.push_back(point(static_cast<float>(random.normal()), static_cast<float>(random.normal()),
-                          static_cast<float>(random.normal()), static_cast<float>(random.uniform(0.0, 1.0))));
+    const auto weight = static_cast<float>(random.uniform(0.0, 1.0));
+    const auto z = static_cast<float>(random.normal()), y = static_cast<float>(random.normal()),
+               x = static_cast<float>(random.normal());
+    items.push_back(point(x, y, z, weight));
   }
   core::ThreadPool pool(2);
   const HierarchyOptions options{.builder = Builder::kWeightedNeuralGas, .branching = 11};

@@ -40,13 +40,15 @@ Transform transform_of(const Pose& X_AB) {
 Vector3d direction_from(core::RandomStream& random) {
   Vector3d v;
   do {
-    v = Vector3d(random.normal(), random.normal(), random.normal());
+    const double z = random.normal(), y = random.normal(), x = random.normal();
+    v = Vector3d(x, y, z);
   } while (v.norm() < 0.1);
   return v.normalized();
 }
 
 geometry::Quaterniond rotation_from(core::RandomStream& random) {
-  return geometry::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized();
+  const double z = random.normal(), y = random.normal(), x = random.normal(), w = random.normal();
+  return geometry::Quaterniond(w, x, y, z).normalized();
 }
 
 /// How often the surface of a closed mesh winds around a point: the solid angles of its triangles
@@ -155,7 +157,8 @@ TEST(Penetration, OfBoxesIsTheirLeastOverlap) {
   double worst = 1.0;
   double sum_of_shares = 0.0;
   for (int i = 0; i < 300; ++i) {
-    Pose pose = Pose::from_translation(0.15 * random.uniform() * direction_from(random));
+    const Vector3d direction = direction_from(random);
+    Pose pose = Pose::from_translation(0.15 * random.uniform() * direction);
     if (i % 3 != 0) pose.rotation = rotation_from(random);
     const Transform X_AB = transform_of(pose);
     const double expected = depth_of_boxes(half_a, half_b, pose);
@@ -233,7 +236,8 @@ TEST(Penetration, IsThatOfEachPiece) {
   for (const TriangleTree& b : {tree_of(geometry::joined(crumb, sphere)), tree_of(geometry::joined(sphere, crumb))}) {
     core::RandomStream random(5, {});
     for (int i = 0; i < 20; ++i) {
-      const Vector3d inside(random.uniform(-0.1, 0.1), random.uniform(-0.15, 0.15), random.uniform(-0.2, 0.2));
+      const double z = random.uniform(-0.2, 0.2), y = random.uniform(-0.15, 0.15), x = random.uniform(-0.1, 0.1);
+      const Vector3d inside(x, y, z);
       const Transform X_AB = transform_of(Pose::from_translation(inside));
       ASSERT_FALSE(collide(a, b, X_AB, scratch.queries()));
       const std::optional<Penetration> found = penetration(a, b, X_AB, {}, scratch);

@@ -62,7 +62,9 @@ Ray nasty_ray(const Mesh& mesh, core::RandomStream& random) {
     return mesh.vertices()[random.uniform_below(mesh.vertices().size())].cast<double>().eval();
   };
   const auto size = static_cast<double>(mesh.size());
-  const Vector3d target = random.uniform() < 0.5 ? any_corner() : Vector3d(0.5 * (any_corner() + any_corner()));
+  const bool at_corner = random.uniform() < 0.5;
+  Vector3d target = any_corner();
+  if (!at_corner) target = 0.5 * (target + any_corner());
   Ray ray;
   const double far = std::pow(10.0, random.uniform(-2.0, 4.0));
   ray.origin = random.uniform() < 0.3 ? any_corner() : Vector3d(target + far * size * unit_vector(random));
@@ -225,7 +227,9 @@ TEST_P(RayQueries, HitTheTriangleTheyStartOn) {
   core::RandomStream random(3, {});
   const TriangleTree tree = tree_of(geometry::make_mesh(geometry::BoxShape{{0.5, 0.25, 0.125}}));
   for (int i = 0; i < 300; ++i) {
-    Vector3d origin(random.uniform(-0.25, 0.25), random.uniform(-0.125, 0.125), random.uniform(-0.0625, 0.0625));
+    const double z = random.uniform(-0.0625, 0.0625), y = random.uniform(-0.125, 0.125),
+                 x = random.uniform(-0.25, 0.25);
+    Vector3d origin(x, y, z);
     const auto axis = static_cast<int>(random.uniform_below(3));
     origin[axis] = static_cast<double>(tree.mesh().vertices()[0][axis]);
     const auto hit = nearest_hit(tree, {origin, unit_vector(random)}, scratch_);

@@ -66,9 +66,8 @@ std::vector<Ray> make_rays(const Mesh& mesh) {
   core::RandomStream random(1, {});
   std::vector<Ray> rays(kRays);
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const Vector3d inside =
-        box.center() +
-        0.5 * box.sizes().cwiseProduct(Vector3d(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)));
+    const double z = random.uniform(-1, 1), y = random.uniform(-1, 1), x = random.uniform(-1, 1);
+    const Vector3d inside = box.center() + 0.5 * box.sizes().cwiseProduct(Vector3d(x, y, z));
     const Vector3d outside = box.center() + 2.0 * radius * unit_vector(random);
     rays[i].origin = rounded(i % 3 == 0 ? inside : outside);
     rays[i].direction = rounded(i % 3 == 0 ? Vector3d(2.0 * radius * unit_vector(random)) : Vector3d(inside - outside));

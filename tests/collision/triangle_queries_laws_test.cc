@@ -216,7 +216,10 @@ TEST(TriangleQueries, AnswerBatchesOfTinyBodiesLikeSingleQueries) {
   int touching = 0;
   for (int exponent = -60; exponent >= -140; exponent -= 4) {
     const auto on_grid = [&] { return std::ldexp(static_cast<float>(random.uniform_below(4)), exponent); };
-    const auto point = [&] { return Vector3f(on_grid(), on_grid(), on_grid()); };
+    const auto point = [&] {
+      const float z = on_grid(), y = on_grid(), x = on_grid();
+      return Vector3f(x, y, z);
+    };
     for (int i = 0; i < 100; ++i) {
       const TriangleTree a = TriangleTree::build(*Mesh::make({point(), point(), point()}, {{0, 1, 2}}, "a"), {}, pool);
       const TriangleTree b = TriangleTree::build(*Mesh::make({point(), point(), point()}, {{0, 1, 2}}, "b"), {}, pool);

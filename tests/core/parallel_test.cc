@@ -83,7 +83,10 @@ TEST(ThreadPool, ReductionsHaveTheSameBitsForAnyNumberOfThreads) {
   // Sums of such numbers depend on the order of additions in many bits.
   std::vector<double> values(10007);
   RandomStream stream(1, Purpose::kTest);
-  for (double& x : values) x = stream.normal() * std::pow(10.0, stream.uniform(-8.0, 8.0));
+  for (double& x : values) {
+    x = stream.normal();
+    x *= std::pow(10.0, stream.uniform(-8.0, 8.0));
+  }
   const auto sum_of = [&](std::size_t begin, std::size_t end) {
     double sum = 0.0;
     for (std::size_t i = begin; i < end; ++i) sum += values[i];

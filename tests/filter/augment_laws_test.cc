@@ -368,7 +368,8 @@ ObjectBelief some_object(const std::string& name, int particles, std::uint64_t s
   object.physics.draws = std::make_shared<const std::vector<belief::PhysicalDraw>>(draws);
   for (int i = 0; i < particles; ++i) {
     Particle particle;
-    particle.X_WO.translation = Vector3d(stream.uniform(), stream.uniform(), stream.uniform());
+    const double z = stream.uniform(), y = stream.uniform(), x = stream.uniform();
+    particle.X_WO.translation = Vector3d(x, y, z);
     particle.V_WO.linear.x() = stream.uniform();
     particle.log_weight = -std::log(particles);
     object.particles.push_back(particle);

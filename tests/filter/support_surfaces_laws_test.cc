@@ -31,7 +31,8 @@ TEST(SupportSurfaces, InsideABoxIsInside) {
   core::RandomStream stream(5, core::Purpose::kTest);
   int inside = 0;
   for (int i = 0; i < 4000; ++i) {
-    const Vector3d p(stream.uniform(-0.7, 0.7), stream.uniform(-0.7, 0.7), stream.uniform(-0.08, 0.04));
+    const double z = stream.uniform(-0.08, 0.04), y = stream.uniform(-0.7, 0.7), x = stream.uniform(-0.7, 0.7);
+    const Vector3d p(x, y, z);
     const bool expected = std::abs(p.x()) < 0.5 && std::abs(p.y()) < 0.5 && p.z() > -0.04 && p.z() < 0.0;
     EXPECT_EQ(surfaces.inside(scene.supports[0].X_WS * p), expected) << p.transpose();
     inside += expected;
@@ -58,8 +59,10 @@ TEST(SupportSurfaces, ASegmentCrossesAPlateIffItsEndsLieOnBothSides) {
   const SupportSurfaces surfaces(scene, meshes);
   core::RandomStream stream(6, core::Purpose::kTest);
   for (int i = 0; i < 2000; ++i) {
-    const Vector3d p(stream.uniform(-0.4, 0.4), stream.uniform(-0.4, 0.4), stream.uniform(0.001, 0.3));
-    const Vector3d q(stream.uniform(-0.4, 0.4), stream.uniform(-0.4, 0.4), stream.uniform(-0.3, 0.3));
+    const double p_z = stream.uniform(0.001, 0.3), p_y = stream.uniform(-0.4, 0.4), p_x = stream.uniform(-0.4, 0.4);
+    const Vector3d p(p_x, p_y, p_z);
+    const double q_z = stream.uniform(-0.3, 0.3), q_y = stream.uniform(-0.4, 0.4), q_x = stream.uniform(-0.4, 0.4);
+    const Vector3d q(q_x, q_y, q_z);
     EXPECT_EQ(surfaces.crosses(p, q), q.z() < 0.0);
   }
 }
@@ -85,7 +88,8 @@ TEST(SupportSurfaces, WhatABodyIsInTheWayOfMovesWithIt) {
   const SupportSurfaces in_own_frame(bin_on_table(), meshes);
   core::RandomStream stream(7, core::Purpose::kTest);
   const auto random_pose = [&stream] {
-    const Vector3d turn(stream.uniform(-1.0, 1.0), stream.uniform(-1.0, 1.0), stream.uniform(-1.0, 1.0));
+    const double z = stream.uniform(-1.0, 1.0), y = stream.uniform(-1.0, 1.0), x = stream.uniform(-1.0, 1.0);
+    const Vector3d turn(x, y, z);
     return Pose{geometry::exp_rotation(turn),
                 {stream.uniform(-0.2, 0.2), stream.uniform(-0.2, 0.2), stream.uniform(-0.1, 0.3)}};
   };

@@ -12,7 +12,8 @@ namespace prescene::geometry {
 namespace {
 
 Vector3d some_direction(core::RandomStream& stream) {
-  return Vector3d(stream.normal(), stream.normal(), stream.normal()).normalized();
+  const double z = stream.normal(), y = stream.normal(), x = stream.normal();
+  return Vector3d(x, y, z).normalized();
 }
 
 TEST(RotationBetween, TakesOneDirectionToTheOtherByTheSmallestAngle) {

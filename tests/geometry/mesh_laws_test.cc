@@ -132,8 +132,10 @@ std::vector<Vector3d> point_cloud(int kind, int count, std::uint64_t seed) {
         points.push_back(kind == 2 ? p : turn * p);
         break;
       }
-      default:
-        points.push_back(std::pow(10.0, stream.uniform(-9.0, 0.0)) * uniform_direction(stream));
+      default: {
+        const Vector3d direction = uniform_direction(stream);
+        points.push_back(std::pow(10.0, stream.uniform(-9.0, 0.0)) * direction);
+      }
     }
   }
   return points;

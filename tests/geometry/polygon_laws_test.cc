@@ -13,7 +13,10 @@ namespace {
 std::vector<Vector2d> points_in_square(int count, std::mt19937& random) {
   std::uniform_real_distribution<double> in(-1.0, 1.0);
   std::vector<Vector2d> points;
-  for (int i = 0; i < count; ++i) points.emplace_back(in(random), in(random));
+  for (int i = 0; i < count; ++i) {
+    const double y = in(random), x = in(random);
+    points.emplace_back(x, y);
+  }
   return points;
 }
 

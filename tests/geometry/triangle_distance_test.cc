@@ -15,7 +15,10 @@ namespace {
 
 TEST(TriangleDistance, IsThatOfTheNearestOfManyPointsOfTheTriangle) {
   core::RandomStream stream(3, core::Purpose::kTest);
-  const auto anywhere = [&] { return Vector3d(stream.uniform() * uniform_direction(stream)); };
+  const auto anywhere = [&] {
+    const Vector3d direction = uniform_direction(stream);
+    return Vector3d(stream.uniform() * direction);
+  };
   for (int round = 0; round < 200; ++round) {
     const Vector3d a = anywhere(), b = anywhere(), c = anywhere(), p = 2.0 * anywhere();
     const double found = std::sqrt(squared_distance_to_triangle(p, a, b, c));

@@ -181,10 +181,13 @@ TEST(Relations, OnIsMirroredBySupportsIsATouchAndIsNeverMutual) {
   for (int heap = 0; heap < 6; ++heap) {
     belief::Scene scene = table_scene();
     for (const char* name : {"a", "b", "c", "d"}) {
-      const Vector3d size(random.uniform(0.04, 0.1), random.uniform(0.04, 0.1), random.uniform(0.04, 0.1));
+      const double height = random.uniform(0.04, 0.1), depth = random.uniform(0.04, 0.1),
+                   width = random.uniform(0.04, 0.1);
+      const Vector3d size(width, depth, height);
       const int i = add_object(scene, primitive_model(name, geometry::BoxShape{size}), name);
+      const double angle = random.uniform(0.0, 6.0);
       place(scene, i,
-            {tests::about({0.3, random.uniform(), 1.0}, random.uniform(0.0, 6.0)),
+            {tests::about({0.3, random.uniform(), 1.0}, angle),
              {random.uniform(-0.08, 0.08), random.uniform(-0.08, 0.08), random.uniform(0.03, 0.12)}});
     }
     const Found found = ask(belief_of(scene, 0.01), with_draws(32));

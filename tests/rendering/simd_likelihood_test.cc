@@ -38,8 +38,9 @@ struct Setting {
               make_render_mesh(geometry::make_mesh(geometry::BoxShape{{0.15, 0.1, 0.2}})),
               make_render_mesh(geometry::make_open_bin({0.2, 0.15, 0.1}, 0.005))};
     for (int i = 0; i < 300; ++i) {
-      const Pose X_CO{geometry::uniform_rotation(stream),
-                      Vector3d(stream.uniform(-0.3, 0.3), stream.uniform(-0.2, 0.2), stream.uniform(0.25, 1.2))};
+      const geometry::Quaterniond rotation = geometry::uniform_rotation(stream);
+      const double z = stream.uniform(0.25, 1.2), y = stream.uniform(-0.2, 0.2), x = stream.uniform(-0.3, 0.3);
+      const Pose X_CO{rotation, Vector3d(x, y, z)};
       hypotheses.push_back({meshes[static_cast<std::size_t>(i) % 3].get(), X_CO, &material});
     }
   }

@@ -280,9 +280,10 @@ std::vector<int> faces(double size, Stepper stepper) {
   for (int i = 0; i < 200; ++i) {
     belief::WorldState start = belief::mean_start(scene);
     start.objects[0].X_WO.rotation = geometry::uniform_rotation(stream);
-    start.objects[0].V_WO.linear = Eigen::Vector3d(stream.normal(), stream.normal(), 0.0) * std::sqrt(size / 0.1);
-    start.objects[0].V_WO.angular =
-        Eigen::Vector3d(stream.normal(), stream.normal(), stream.normal()) * 5.0 / similarity.time();
+    const double v_y = stream.normal(), v_x = stream.normal();
+    start.objects[0].V_WO.linear = Eigen::Vector3d(v_x, v_y, 0.0) * std::sqrt(size / 0.1);
+    const double rate_z = stream.normal(), rate_y = stream.normal(), rate_x = stream.normal();
+    start.objects[0].V_WO.angular = Eigen::Vector3d(rate_x, rate_y, rate_z) * 5.0 / similarity.time();
     starts.push_back(start);
   }
   std::vector<belief::Trajectory> trajectories(starts.size());

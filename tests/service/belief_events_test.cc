@@ -79,9 +79,11 @@ TEST(BeliefEvents, TellAllThatTheBeliefsSay) {
     for (const char* name : {"mug", "box", "unknown_1"}) {
       const auto before = std::find_if(summary.objects.begin(), summary.objects.end(),
                                        [&](const ObjectSummary& o) { return o.name == name; });
-      ObjectSummary object = before != summary.objects.end() && stream.uniform_below(3) > 0
-                                 ? *before
-                                 : object_of(name, states[stream.uniform_below(4)], motions[stream.uniform_below(3)]);
+      const auto drawn = [&] {
+        const auto motion = motions[stream.uniform_below(3)];
+        return object_of(name, states[stream.uniform_below(4)], motion);
+      };
+      ObjectSummary object = before != summary.objects.end() && stream.uniform_below(3) > 0 ? *before : drawn();
       object.is_new = object.name == "unknown_1";
       if (object.is_new && stream.uniform_below(4) == 0) continue;
       expected_states[name] = belief::to_string(object.state);

@@ -58,10 +58,12 @@ class Damage {
   std::string damaged_text(std::string text) {
     for (std::size_t i = 1 + below(4); i > 0 && !text.empty(); --i) {
       const std::size_t at = below(text.size());
-      if (below(2) == 0)
+      if (below(2) == 0) {
         text[at] = static_cast<char>(stream_.next_u32());
-      else
-        text.insert(at, text.substr(below(text.size()), below(20)));
+      } else {
+        const std::size_t length = below(20);
+        text.insert(at, text.substr(below(text.size()), length));
+      }
     }
     return text;
   }

@@ -144,7 +144,8 @@ TEST_F(ObjectCalibrationTest, SaysThatAFitIsPoor) {
   // Something else touches it: after the first contact it drifts to a side of its own.
   core::RandomStream stream(2, core::Purpose::kTest);
   for (SimulatedMotion& motion : motions) {
-    const geometry::Vector3d drift(stream.normal(), stream.normal(), 0.0);
+    const double y = stream.normal(), x = stream.normal();
+    const geometry::Vector3d drift(x, y, 0.0);
     for (std::size_t i = 0; i < motion.times.size(); ++i)
       motion.X_WO[i].translation += std::max(0.0, motion.times[i] - motion.first_contact) * drift;
   }

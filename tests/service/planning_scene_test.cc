@@ -110,8 +110,9 @@ TEST(PlanningScene, BecomesAsTheBeliefIsHoweverManyAreSentAtOnce) {
       for (ObjectSummary& object : summary.objects) {
         object.state = states[stream.uniform_below(4)];
         if (stream.uniform_below(2) == 0) continue;
-        object.X_WO = {tests::about({1.0, 2.0, 3.0}, 0.01 * stream.normal()),
-                       geometry::Vector3d(stream.normal(), stream.normal(), stream.normal()) * 0.01};
+        const double angle = 0.01 * stream.normal();
+        const double z = stream.normal(), y = stream.normal(), x = stream.normal();
+        object.X_WO = {tests::about({1.0, 2.0, 3.0}, angle), geometry::Vector3d(x, y, z) * 0.01};
       }
       for (int step = 0; step < 8; ++step) {
         const auto messages = told(planning, summary, scene);

@@ -107,8 +107,10 @@ class Damage {
       case 1:
         text[place] = static_cast<char>(below(256));
         return text;
-      case 2:
-        return text.insert(place, std::string(1 + below(3), static_cast<char>(0x80 + below(128))));
+      case 2: {
+        const auto byte = static_cast<char>(0x80 + below(128));
+        return text.insert(place, std::string(1 + below(3), byte));
+      }
       default:
         return text.erase(place, 1 + below(20));
     }

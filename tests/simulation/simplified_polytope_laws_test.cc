@@ -17,8 +17,10 @@ namespace {
 ConvexPolytope ball_of_points(int count) {
   core::RandomStream stream(1, core::Purpose::kTest);
   std::vector<Vector3d> points;
-  for (int i = 0; i < count; ++i)
-    points.emplace_back(0.05 * Vector3d(stream.normal(), stream.normal(), stream.normal()).normalized());
+  for (int i = 0; i < count; ++i) {
+    const double z = stream.normal(), y = stream.normal(), x = stream.normal();
+    points.emplace_back(0.05 * Vector3d(x, y, z).normalized());
+  }
   return *make_polytope(points);
 }
 

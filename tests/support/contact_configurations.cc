@@ -202,7 +202,8 @@ std::vector<Transform> ContactConfigurations::scattered(int count) {
 std::vector<Transform> ContactConfigurations::around(const Transform& X_AB, int count) {
   std::vector<Transform> found(static_cast<std::size_t>(count), X_AB);
   for (Transform& X : found) {
-    const Vector3d moved = size_ * std::pow(10.0, stream_.uniform(-8.0, -2.0)) * geometry::uniform_direction(stream_);
+    const Vector3d direction = geometry::uniform_direction(stream_);
+    const Vector3d moved = size_ * std::pow(10.0, stream_.uniform(-8.0, -2.0)) * direction;
     for (int k = 0; k < 3; ++k) X.translation[static_cast<std::size_t>(k)] += static_cast<float>(moved[k]);
   }
   return found;
@@ -217,7 +218,8 @@ std::array<Transform, 16> ContactConfigurations::near(const Transform& X_AB) {
   std::array<Transform, 16> batch;
   for (Transform& X : batch) {
     // Half the way each, so that any two are within the limit.
-    const Vector3d moved = 0.005 * size_ * std::cbrt(stream_.uniform()) * geometry::uniform_direction(stream_);
+    const Vector3d direction = geometry::uniform_direction(stream_);
+    const Vector3d moved = 0.005 * size_ * std::cbrt(stream_.uniform()) * direction;
     const double angle = 0.5 * M_PI / 180.0 * std::cbrt(stream_.uniform());
     const Quaterniond R = Quaterniond(Eigen::AngleAxisd(angle, geometry::uniform_direction(stream_))) * R_AB;
     X = transform_of(R, centre + moved - R * box_b_.center());

@@ -373,8 +373,8 @@ TEST_P(StepperContract, WhatIsWedgedGainsNoEnergy) {
   for (WorldState& start : starts)
     for (belief::ObjectState& object : start.objects) {
       object.X_WO.translation.x() += 0.01 * stream.normal();
-      object.X_WO.rotation =
-          geometry::exp_rotation(Vector3d(0.2 * stream.normal(), 0.2 * stream.normal(), 0.6 * stream.normal()));
+      const double about_z = 0.6 * stream.normal(), about_y = 0.2 * stream.normal(), about_x = 0.2 * stream.normal();
+      object.X_WO.rotation = geometry::exp_rotation(Vector3d(about_x, about_y, about_z));
     }
   std::vector<belief::Trajectory> runs(starts.size());
   core::ThreadPool pool(1);

@@ -203,9 +203,11 @@ class Mutator {
         case 1:
           text_in.erase(at, 1 + below(5));
           break;
-        case 2:
-          text_in.insert(at, text_in.substr(below(text_in.size()), below(20)));
+        case 2: {
+          const std::size_t length = below(20);
+          text_in.insert(at, text_in.substr(below(text_in.size()), length));
           break;
+        }
         default:
           text_in.insert(at, "1e999");
       }
@@ -237,7 +239,10 @@ class Mutator {
     if (rarely()) info.width = static_cast<std::uint32_t>(random_());
     if (rarely()) info.k[below(9)] = number();
     if (rarely()) info.p[below(12)] = number();
-    if (rarely()) info.d.assign(below(2000), number());
+    if (rarely()) {
+      const double value = number();
+      info.d.assign(below(2000), value);
+    }
     if (rarely()) info.distortion_model = text();
     return info;
   }

@@ -30,8 +30,8 @@ std::shared_ptr<const Mesh> ragged(int count, std::uint64_t seed) {
   std::vector<Vector3f> vertices;
   std::vector<TriangleIndices> triangles;
   const auto point = [&](double size) -> Vector3f {
-    return Eigen::Vector3d(random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size))
-        .cast<float>();
+    const double z = random.uniform(-size, size), y = random.uniform(-size, size), x = random.uniform(-size, size);
+    return Eigen::Vector3d(x, y, z).cast<float>();
   };
   for (int i = 0; i < count; ++i) {
     const Vector3f place = point(1.0);
@@ -76,11 +76,12 @@ void add_poses(DopCase& pair, std::uint64_t seed) {
     return pair.poses.back().collides;
   };
   for (int i = 0; i < kPoses; ++i) {
-    Eigen::Quaterniond R_AB(random.normal(), random.normal(), random.normal(), random.normal());
+    const double z = random.normal(), y = random.normal(), x = random.normal(), w = random.normal();
+    Eigen::Quaterniond R_AB(w, x, y, z);
     R_AB.normalize();
     if (i % 8 == 0) R_AB = Eigen::Quaterniond::Identity();
-    const Eigen::Vector3d direction =
-        Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized() * size;
+    const double to_z = random.normal(), to_y = random.normal(), to_x = random.normal();
+    const Eigen::Vector3d direction = Eigen::Vector3d(to_x, to_y, to_z).normalized() * size;
     // From apart to where they meet first on the way, or nearly so.
     double apart = 0.6;
     double meeting = -1.0;

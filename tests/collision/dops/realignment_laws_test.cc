@@ -35,7 +35,8 @@ TEST(HalfPrecision, RoundsUp) {
 TEST(SinglePrecision, RoundsUp) {
   core::RandomStream random(1, core::Purpose::kTest);
   for (int i = 0; i < 10'000; ++i) {
-    const double value = random.normal() * std::pow(10.0, random.uniform(-30.0, 30.0));
+    const double mantissa = random.normal();
+    const double value = mantissa * std::pow(10.0, random.uniform(-30.0, 30.0));
     ASSERT_GE(static_cast<double>(round_up(value)), value);
     ASSERT_LT(static_cast<double>(std::nextafter(round_up(value), -std::numeric_limits<float>::infinity())), value);
   }
@@ -43,10 +44,11 @@ TEST(SinglePrecision, RoundsUp) {
 
 std::shared_ptr<const Mesh> cloud(core::RandomStream& random, double size, double offset) {
   std::vector<Vector3f> vertices;
-  const Eigen::Vector3d shift(random.uniform(-offset, offset), random.uniform(-offset, offset), offset);
+  const double shift_y = random.uniform(-offset, offset), shift_x = random.uniform(-offset, offset);
+  const Eigen::Vector3d shift(shift_x, shift_y, offset);
   for (int i = 0; i < 30; ++i) {
-    vertices.push_back(
-        (shift + size * Eigen::Vector3d(random.normal(), random.normal(), random.normal())).cast<float>());
+    const double z = random.normal(), y = random.normal(), x = random.normal();
+    vertices.push_back((shift + size * Eigen::Vector3d(x, y, z)).cast<float>());
   }
   std::vector<TriangleIndices> triangles;
   for (std::uint32_t i = 0; i + 2 < 30; i += 3) triangles.push_back({i, i + 1, i + 2});
@@ -73,8 +75,11 @@ TEST(Realignment, BoundsPlacedVertices) {
       const DopSpace space_a = DopSpace::of(*a);
       const DopSpace space_b = DopSpace::of(*b);
       geometry::Pose X;
-      X.rotation = Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized();
-      X.translation = Eigen::Vector3d(random.normal(), random.normal(), random.normal()) * (size_a + offset);
+      const double turn_z = random.normal(), turn_y = random.normal(), turn_x = random.normal(),
+                   turn_w = random.normal();
+      X.rotation = Eigen::Quaterniond(turn_w, turn_x, turn_y, turn_z).normalized();
+      const double z = random.normal(), y = random.normal(), x = random.normal();
+      X.translation = Eigen::Vector3d(x, y, z) * (size_a + offset);
       const Transform X_AB = *to_transform(X);
       Hierarchy shape;
       for (std::uint32_t i = 0; i < b->triangle_count(); ++i) shape.order.push_back(i);

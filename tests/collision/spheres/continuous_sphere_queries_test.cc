@@ -297,7 +297,8 @@ TEST(ContinuousSphereQueries, DoNotAllocateOnceWarm) {
   RandomStream stream(9, core::Purpose::kTest);
   const auto tree_a = tree_of(cloud(stream, 100), 16);
   const auto tree_b = tree_of(cloud(stream, 100), 16);
-  const auto motion = ScrewMotion::make(random_pose(stream, 0.8), random_pose(stream, 0.8));
+  const Pose end = random_pose(stream, 0.8), begin = random_pose(stream, 0.8);
+  const auto motion = ScrewMotion::make(begin, end);
   ASSERT_TRUE(motion.ok());
   SweepScratch scratch;
   time_of_impact(*tree_a, *tree_b, *motion, {}, scratch);

@@ -83,9 +83,8 @@ double reference(const Vector3d& mean, const Vector3d& deviation, double radius,
 }
 
 Matrix3d random_rotation(RandomStream& stream) {
-  return Eigen::Quaterniond(stream.normal(), stream.normal(), stream.normal(), stream.normal())
-      .normalized()
-      .toRotationMatrix();
+  const double z = stream.normal(), y = stream.normal(), x = stream.normal(), w = stream.normal();
+  return Eigen::Quaterniond(w, x, y, z).normalized().toRotationMatrix();
 }
 
 struct Case {
@@ -109,7 +108,8 @@ Case random_case(RandomStream& stream) {
   std::sort(c.deviation.begin(), c.deviation.end());
   const double distance =
       stream.uniform() < 0.5 ? std::abs(1.0 + stream.uniform(-4.0, 4.0) * c.deviation[2]) : stream.uniform(0.0, 3.0);
-  Vector3d direction = Vector3d(stream.normal(), stream.normal(), stream.normal()).normalized();
+  const double along_z = stream.normal(), along_y = stream.normal(), along_x = stream.normal();
+  Vector3d direction = Vector3d(along_x, along_y, along_z).normalized();
   if (stream.uniform() < 0.4) direction = Vector3d::Unit(static_cast<int>(stream.uniform_below(3)));
   c.mean = c.radius * distance * direction;
   c.deviation *= c.radius;
@@ -152,7 +152,8 @@ TEST(DistanceProbability, AgreesWithDraws) {
     const Matrix3d R = random_rotation(stream);
     int inside = 0;
     for (int k = 0; k < kDraws; ++k) {
-      const Vector3d z(stream.normal(), stream.normal(), stream.normal());
+      const double along_z = stream.normal(), along_y = stream.normal(), along_x = stream.normal();
+      const Vector3d z(along_x, along_y, along_z);
       if ((c.mean + c.deviation.cwiseProduct(z)).norm() <= c.radius) ++inside;
     }
     const double share = static_cast<double>(inside) / kDraws;

@@ -266,7 +266,8 @@ double largest_lack(const Mesh& mesh, const SpherePacking& packing) {
   core::RandomStream stream(1, core::Purpose::kTest);
   double largest = 0.0;
   for (int i = 0; i < 1000; ++i) {
-    const Vector3d u = Vector3d(stream.normal(), stream.normal(), stream.normal()).normalized();
+    const double z = stream.normal(), y = stream.normal(), x = stream.normal();
+    const Vector3d u = Vector3d(x, y, z).normalized();
     double body = -1e9;
     for (const Vector3f& v : mesh.vertices()) body = std::max(body, u.dot(v.cast<double>()));
     double spheres = -1e9;

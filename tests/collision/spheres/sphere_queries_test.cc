@@ -61,7 +61,8 @@ std::vector<Transform> random_transforms(int count, std::uint64_t seed, double r
   std::vector<Transform> transforms = {Transform()};
   while (static_cast<int>(transforms.size()) < count) {
     geometry::Pose X;
-    const Eigen::Vector4d q(stream.normal(), stream.normal(), stream.normal(), stream.normal());
+    const double z = stream.normal(), y = stream.normal(), x = stream.normal(), w = stream.normal();
+    const Eigen::Vector4d q(w, x, y, z);
     X.rotation = geometry::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
     for (int axis = 0; axis < 3; ++axis) X.translation[axis] = stream.uniform(-reach, reach);
     transforms.push_back(*to_transform(X));

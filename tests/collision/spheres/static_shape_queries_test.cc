@@ -105,7 +105,8 @@ TEST(StaticShapeQueries, VolumeIsThatOfTheHalfSpaceAndAtLeastThatOfAConvexSolid)
       const Vector3d centre = X_AB.inverse() * sphere.centre.cast<double>();
       int inside = 0;
       for (int i = 0; i < kDraws;) {
-        const Vector3d q(stream.uniform(-1, 1), stream.uniform(-1, 1), stream.uniform(-1, 1));
+        const double z = stream.uniform(-1, 1), y = stream.uniform(-1, 1), x = stream.uniform(-1, 1);
+        const Vector3d q(x, y, z);
         if (q.squaredNorm() > 1.0) continue;
         ++i;
         inside += shape.is_within(centre + radius * q, 0.0) ? 1 : 0;

@@ -61,7 +61,8 @@ TEST(PrimitiveShape, AgreesWithItsMesh) {
         *TriangleSurface::make(to_mesh(geometry::make_mesh(round, 256)), SurfaceSide::kSolid, shape_pool());
     core::RandomStream stream(4, core::Purpose::kTest);
     for (int i = 0; i < 200; ++i) {
-      const Vector3d p(stream.uniform(-0.4, 0.4), stream.uniform(-0.4, 0.4), stream.uniform(-0.4, 0.4));
+      const double z = stream.uniform(-0.4, 0.4), y = stream.uniform(-0.4, 0.4), x = stream.uniform(-0.4, 0.4);
+      const Vector3d p(x, y, z);
       EXPECT_NEAR(exact.nearest(p, kFar)->distance, facets.nearest(p, kFar)->distance, 1e-4);
     }
   }
@@ -141,7 +142,8 @@ TEST(TriangleSurface, SharesATreeThatCameFromAFile) {
   EXPECT_EQ(shared.tree(), tree);
   core::RandomStream stream(5, core::Purpose::kTest);
   for (int i = 0; i < 200; ++i) {
-    const Vector3d p(stream.uniform(-0.3, 0.3), stream.uniform(-0.3, 0.3), stream.uniform(-0.1, 0.3));
+    const double z = stream.uniform(-0.1, 0.3), y = stream.uniform(-0.3, 0.3), x = stream.uniform(-0.3, 0.3);
+    const Vector3d p(x, y, z);
     EXPECT_EQ(shared.nearest(p, kFar)->distance, own.nearest(p, kFar)->distance);
   }
 }
@@ -181,7 +183,8 @@ TEST(HeightField, AgreesWithItsTriangles) {
   core::RandomStream stream(10, core::Purpose::kTest);
   int above = 0;
   for (int i = 0; i < 500; ++i) {
-    const Vector3d p(stream.uniform(0.2, 0.6), stream.uniform(0.2, 0.55), stream.uniform(-0.1, 0.4));
+    const double z = stream.uniform(-0.1, 0.4), y = stream.uniform(0.2, 0.55), x = stream.uniform(0.2, 0.6);
+    const Vector3d p(x, y, z);
     double squared = std::numeric_limits<double>::infinity();
     for (int r = 0; r + 1 < grid.rows; ++r) {
       for (int c = 0; c + 1 < grid.columns; ++c) {

@@ -162,7 +162,8 @@ TEST(NearPairs, AreThoseOfBruteForceOnEveryInstructionSet) {
   SphereScratch scratch;
   for (int i = 0; i < 20; ++i) {
     const Eigen::Matrix3d R = geometry::uniform_rotation(stream).toRotationMatrix();
-    const Transform X_AB = rounded_transform(R, Vector3d(stream.uniform(-0.1, 0.1), stream.uniform(-0.1, 0.1), 0.02));
+    const double y = stream.uniform(-0.1, 0.1), x = stream.uniform(-0.1, 0.1);
+    const Transform X_AB = rounded_transform(R, Vector3d(x, y, 0.02));
     const double range = i % 2 == 0 ? 0.0 : 0.01;
     std::vector<SpherePair> sure, perhaps;
     for (std::uint32_t a = 0; a < all.size(); ++a) {

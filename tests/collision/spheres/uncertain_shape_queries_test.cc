@@ -358,7 +358,8 @@ TEST(UncertainShapeQueries, FirstOrderAndRemainderBoundTheDisplacementSeenFromTh
     for (int i = 0; i < 500; ++i) {
       const Vector6d d_A = L_A * normals(stream);
       const Vector6d d_B = L_B * normals(stream);
-      const Vector3d p(stream.uniform(-0.1, 0.1), stream.uniform(-0.1, 0.1), stream.uniform(-0.1, 0.1));
+      const double p_z = stream.uniform(-0.1, 0.1), p_y = stream.uniform(-0.1, 0.1), p_x = stream.uniform(-0.1, 0.1);
+      const Vector3d p(p_x, p_y, p_z);
       const Pose X_BA = box_plus(setting.support.X_WB, d_B).inverse() * box_plus(setting.body.X_WB, d_A);
       const Vector3d moved = X_AB * (X_BA * p) - p;  // in A's axes
       const Vector3d phi_B = X_AB.rotation * Vector3d(d_B.head<3>());
@@ -367,7 +368,8 @@ TEST(UncertainShapeQueries, FirstOrderAndRemainderBoundTheDisplacementSeenFromTh
       ASSERT_LE((moved + linear).norm(), between->reversed_remainder((p - between->pivot()).norm()));
       ASSERT_LE(moved.norm(), between->reversed_displacement(p));
       // Along a direction: also along the one about which bodies turn most.
-      const Vector3d random(stream.uniform(-1, 1), stream.uniform(-1, 1), stream.uniform(-1, 1));
+      const double z = stream.uniform(-1, 1), y = stream.uniform(-1, 1), x = stream.uniform(-1, 1);
+      const Vector3d random(x, y, z);
       const Vector3d n = i % 2 == 0 ? Vector3d(Vector3d::UnitZ()) : Vector3d(random.normalized());
       const double missed = std::abs(n.dot(moved + linear));
       ASSERT_LE(missed, between->reversed_along(n).remainder(p));
@@ -379,7 +381,9 @@ TEST(UncertainShapeQueries, FirstOrderAndRemainderBoundTheDisplacementSeenFromTh
 TEST(UncertainShapeQueries, ShapesReachAsFarAsTheySay) {
   RandomStream stream(34, core::Purpose::kTest);
   const auto vector = [&](double reach) {
-    return Vector3d(stream.uniform(-reach, reach), stream.uniform(-reach, reach), stream.uniform(-reach, reach));
+    const double z = stream.uniform(-reach, reach), y = stream.uniform(-reach, reach),
+                 x = stream.uniform(-reach, reach);
+    return Vector3d(x, y, z);
   };
   for (const std::unique_ptr<StaticShape>& shape : every_shape()) {
     for (int i = 0; i < 2000; ++i) {

@@ -187,8 +187,10 @@ TEST(UncertainSphereQueries, TheStateIsThatOfAllPairs) {
   std::array<int, 3> seen{};
   for (int i = 0; i < 3000; ++i) {
     const double scale = std::pow(10.0, stream.uniform(-4.0, -1.5));
-    const Vector3d direction(stream.normal(), stream.normal(), stream.normal());
-    const geometry::Quaterniond turn(stream.normal(), stream.normal(), stream.normal(), stream.normal());
+    const double z = stream.normal(), y = stream.normal(), x = stream.normal();
+    const Vector3d direction(x, y, z);
+    const double turn_z = stream.normal(), turn_y = stream.normal(), turn_x = stream.normal(), turn_w = stream.normal();
+    const geometry::Quaterniond turn(turn_w, turn_x, turn_y, turn_z);
     const Pose X_AB = {turn.normalized(), stream.uniform(0.0, 0.12) * direction.normalized()};
     const Matrix6d covariance = diagonal(Vector3d::Constant(10.0 * scale), Vector3d::Constant(scale));
     const auto between = RelativeUncertainty::make({Pose::identity(), covariance}, {X_AB, covariance});
@@ -241,7 +243,9 @@ TEST(UncertainSphereQueries, CovariancesOfAnySizeAreJoined) {
   for (int i = 0; i < 20'000; ++i) {
     UncertainPose poses[2];
     for (UncertainPose& pose : poses) {
-      pose.X_WB = {geometry::uniform_rotation(random), random.uniform(0.0, 30.0) * geometry::normal_vector(random)};
+      const geometry::Quaterniond rotation = geometry::uniform_rotation(random);
+      const Vector3d towards = geometry::normal_vector(random);
+      pose.X_WB = {rotation, random.uniform(0.0, 30.0) * towards};
       // A few directions of very different sizes.
       geometry::Matrix6d factor = geometry::Matrix6d::Zero();
       for (int k = 0; k < static_cast<int>(1 + random.uniform_below(4)); ++k) {
@@ -269,7 +273,8 @@ TEST(UncertainSphereQueries, FirstOrderAndRemainderBoundTheDisplacement) {
     for (int i = 0; i < 2000; ++i) {
       const Vector6d d_A = L_A * normals(stream);
       const Vector6d d_B = L_B * normals(stream);
-      const Vector3d p_BQ(stream.uniform(-0.1, 0.1), stream.uniform(-0.1, 0.1), stream.uniform(-0.1, 0.1));
+      const double z = stream.uniform(-0.1, 0.1), y = stream.uniform(-0.1, 0.1), x = stream.uniform(-0.1, 0.1);
+      const Vector3d p_BQ(x, y, z);
       const Vector3d p = X_AB * p_BQ;
       const Pose X_AB_drawn = box_plus(setting.pose_a.X_WB, d_A).inverse() * box_plus(setting.pose_b.X_WB, d_B);
       const Vector3d moved = X_AB_drawn * p_BQ - p;

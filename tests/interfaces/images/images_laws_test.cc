@@ -18,14 +18,16 @@ using geometry::Image;
 
 template <class Pixel, class Draw>
 Image<Pixel> random_image(core::RandomStream* stream, Draw draw) {
-  Image<Pixel> image(static_cast<int>(1 + stream->uniform_below(30)), static_cast<int>(1 + stream->uniform_below(30)));
+  const int height = static_cast<int>(1 + stream->uniform_below(30));
+  Image<Pixel> image(static_cast<int>(1 + stream->uniform_below(30)), height);
   for (std::size_t i = 0; i < image.size(); ++i) image.data()[i] = draw();
   return image;
 }
 
 /// A smooth picture, as cameras give, so that JPEG's error stays small.
 ColorImage smooth_image(core::RandomStream* stream) {
-  ColorImage image(static_cast<int>(8 + stream->uniform_below(60)), static_cast<int>(8 + stream->uniform_below(60)));
+  const int height = static_cast<int>(8 + stream->uniform_below(60));
+  ColorImage image(static_cast<int>(8 + stream->uniform_below(60)), height);
   const double fx = stream->uniform(0.0, 0.1);
   const double fy = stream->uniform(0.0, 0.1);
   for (int y = 0; y < image.height(); ++y) {

@@ -528,8 +528,10 @@ std::string odd_bytes(core::RandomStream* stream) {
       return bytes_of(std::uint32_t{1} << stream->uniform_below(32));
     case 3:
       return bytes_of(stream->uniform_below(2) == 0 ? std::numeric_limits<float>::infinity() : 1e38F);
-    default:
-      return std::string(1 + stream->uniform_below(16), static_cast<char>(stream->uniform_below(256)));
+    default: {
+      const auto byte = static_cast<char>(stream->uniform_below(256));
+      return std::string(1 + stream->uniform_below(16), byte);
+    }
   }
 }
 

@@ -15,7 +15,9 @@ namespace {
 using geometry::TriangleMesh;
 
 TriangleMesh random_mesh(core::RandomStream* stream) {
-  const geometry::Vector3d size(stream->uniform(0.05, 0.5), stream->uniform(0.05, 0.5), stream->uniform(0.05, 0.5));
+  const double height = stream->uniform(0.05, 0.5), depth = stream->uniform(0.05, 0.5),
+               width = stream->uniform(0.05, 0.5);
+  const geometry::Vector3d size(width, depth, height);
   const auto segments = static_cast<int>(8 + stream->uniform_below(10));
   TriangleMesh mesh;
   switch (stream->uniform_below(3)) {

@@ -53,9 +53,11 @@ std::vector<Obstacle> some_obstacles() {
 }
 
 Configuration random_configuration(core::RandomStream& random) {
-  const Vector3d turn(random.normal(), random.normal(), random.normal());
+  const double turn_z = random.normal(), turn_y = random.normal(), turn_x = random.normal();
+  const Vector3d turn(turn_x, turn_y, turn_z);
   const auto coordinate = [&] { return 1.2 * (random.uniform() - 0.5); };
-  const Vector3d p(coordinate(), coordinate(), coordinate());
+  const double z = coordinate(), y = coordinate(), x = coordinate();
+  const Vector3d p(x, y, z);
   return RigidBody::configuration({geometry::exp_rotation(turn), p});
 }
 
@@ -156,8 +158,10 @@ TEST(MotionCheckerLaws, NoPlateIsTooThin) {
     PlanningScratch scratch;
     core::RandomStream random(13, core::Purpose::kTest);
     for (int i = 0; i < 200; ++i) {
-      const Vector3d p(0.0, 0.8 * (random.uniform() - 0.5), 0.8 * (random.uniform() - 0.5));
-      const Vector3d way(50.0 * (0.1 + random.uniform()), random.normal(), random.normal());
+      const double z = 0.8 * (random.uniform() - 0.5), y = 0.8 * (random.uniform() - 0.5);
+      const Vector3d p(0.0, y, z);
+      const double way_z = random.normal(), way_y = random.normal(), way_x = 50.0 * (0.1 + random.uniform());
+      const Vector3d way(way_x, way_y, way_z);
       const Configuration q0 = RigidBody::configuration(Pose::from_translation(p - random.uniform() * way));
       const Configuration q1 = RigidBody::configuration(Pose::from_translation(p + random.uniform() * way));
       if (!checker->is_free(q0, scratch) || !checker->is_free(q1, scratch)) continue;

@@ -171,8 +171,10 @@ TEST(OmplLaws, TheLastValidStateIsValidAndBeforeThePlate) {
   core::RandomStream random(31, core::Purpose::kTest);
   for (int i = 0; i < 100; ++i) {
     const auto coordinate = [&] { return random.uniform(-0.3, 0.3); };
-    const auto from = problem.state({-0.6, coordinate(), coordinate()}, {random.normal(), random.normal(), 0.1});
-    const auto to = problem.state({0.6, coordinate(), coordinate()}, {0.0, random.normal(), random.normal()});
+    const Vector3d from_turn{random.normal(), random.normal(), 0.1};
+    const auto from = problem.state({-0.6, coordinate(), coordinate()}, from_turn);
+    const Vector3d to_turn{0.0, random.normal(), random.normal()};
+    const auto to = problem.state({0.6, coordinate(), coordinate()}, to_turn);
     std::pair<ob::State*, double> last_valid(last, -1.0);
     ASSERT_FALSE(problem.si->checkMotion(from.get(), to.get(), last_valid));
     ASSERT_GT(last_valid.second, 0.1);
@@ -202,8 +204,8 @@ TEST(OmplLaws, ThreadsGetTheAnswersOfOne) {
   std::vector<ob::ScopedState<ob::SE3StateSpace>> states;
   for (int i = 0; i < 200; ++i) {
     const auto coordinate = [&] { return random.uniform(-0.8, 0.8); };
-    states.push_back(
-        problem.state({coordinate(), coordinate(), coordinate()}, {random.normal(), random.normal(), random.normal()}));
+    const Vector3d turn{random.normal(), random.normal(), random.normal()};
+    states.push_back(problem.state({coordinate(), coordinate(), coordinate()}, turn));
   }
   const auto answers = [&] {
     std::vector<int> all;

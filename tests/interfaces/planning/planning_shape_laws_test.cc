@@ -38,9 +38,10 @@ PlanningShape shape_of(const geometry::Primitive& primitive) {
 }
 
 Pose random_pose(core::RandomStream& random, double reach) {
-  const Vector3d turn(random.normal(), random.normal(), random.normal());
-  return {geometry::exp_rotation(turn),
-          reach * Vector3d(random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5)};
+  const double turn_z = random.normal(), turn_y = random.normal(), turn_x = random.normal();
+  const Vector3d turn(turn_x, turn_y, turn_z);
+  const double z = random.uniform() - 0.5, y = random.uniform() - 0.5, x = random.uniform() - 0.5;
+  return {geometry::exp_rotation(turn), reach * Vector3d(x, y, z)};
 }
 
 /// Points of the surfaces of primitives of radius 0.1 m and length 0.3 m, at an angle about z and a share of the rest.

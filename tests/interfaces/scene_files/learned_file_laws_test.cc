@@ -50,7 +50,8 @@ belief::PhysicalBelief random_physics(RandomStream& stream, int dimensions) {
   }
   for (belief::PhysicalDraw& draw : draws) draw.log_weight -= std::log(sum);
   physics.draws = std::make_shared<const std::vector<belief::PhysicalDraw>>(std::move(draws));
-  physics.cell = tests::random_below(stream, 2) * stream.uniform();
+  physics.cell = tests::random_below(stream, 2);
+  physics.cell *= stream.uniform();
   physics.lessons = 1 + tests::random_below(stream, 9);
   physics.learned_ns = static_cast<core::TimeNs>(stream.next_u64() >> 1);
   return physics;

@@ -344,10 +344,12 @@ TEST(RobotDescription, DamageIsReportedOrHarmless) {
     if (trial % 3 == 0) text.resize(random() % text.size());
     for (unsigned changes = random() % 4; changes > 0 && !text.empty(); --changes) {
       const std::size_t at = random() % text.size();
-      if (random() % 2 == 0)
+      if (random() % 2 == 0) {
         text[at] = static_cast<char>(random());
-      else
-        text.insert(at, text.substr(random() % text.size(), random() % 40));
+      } else {
+        const std::size_t length = random() % 40;
+        text.insert(at, text.substr(random() % text.size(), length));
+      }
     }
     Described damaged(text);
     const auto scene = damaged.scene();

@@ -56,7 +56,8 @@ TEST(ForecastScores, RegionsCoverWhatTheyPromise) {
   core::RandomStream stream(3, core::Purpose::kTest);
   const auto draw = [&](int& group) {
     group = stream.uniform() < 0.3 ? 1 : 0;
-    const Eigen::Vector2d z(0.02 * stream.normal(), 0.005 * stream.normal());
+    const double y = 0.005 * stream.normal(), x = 0.02 * stream.normal();
+    const Eigen::Vector2d z(x, y);
     return Eigen::Vector2d(z + Eigen::Vector2d(group * 0.3, 0.0));
   };
   const int repeats = 300;

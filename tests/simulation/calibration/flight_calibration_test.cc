@@ -43,7 +43,8 @@ Quaterniond top(const Quaterniond& start, const Vector3d& spin, double time) {
 
 std::vector<TimedPose> flight(core::RandomStream& stream, int frames, double most_spin, const Noise& noise) {
   const Vector3d v = Vector3d(1.0, 0.3, 0.5) + 0.3 * geometry::normal_vector(stream);
-  const Vector3d spin = most_spin * stream.uniform(0.3, 1.0) * geometry::normal_vector(stream).normalized();
+  const Vector3d axis = geometry::normal_vector(stream).normalized();
+  const Vector3d spin = most_spin * stream.uniform(0.3, 1.0) * axis;
   const Quaterniond start = geometry::exp_rotation(2.0 * geometry::normal_vector(stream));
   std::vector<TimedPose> poses;
   for (int i = 0; i < frames; ++i) {

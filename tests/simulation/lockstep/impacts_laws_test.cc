@@ -28,7 +28,8 @@ std::vector<WorldState> thrown(const Scene& scene, int count, double height, dou
   for (int i = 0; i < count; ++i) {
     WorldState start = start_of(scene);
     start.objects[0].X_WO = {geometry::uniform_rotation(stream), {0.0, 0.0, height}};
-    start.objects[0].V_WO.angular = spin * Vector3d(stream.normal(), stream.normal(), stream.normal());
+    const double z = stream.normal(), y = stream.normal(), x = stream.normal();
+    start.objects[0].V_WO.angular = spin * Vector3d(x, y, z);
     starts.push_back(start);
   }
   return starts;

@@ -43,7 +43,8 @@ TEST_P(SlenderBodies, StrikeFloorsAndEdgesWithoutGainingEnergy) {
                                           Pose::from_translation({0.05, 0.0, 0.04})));
       core::RandomStream random(1, core::Purpose::kTest);
       const auto any = [&](double size) {
-        return Vector3d(random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size));
+        const double z = random.uniform(-size, size), y = random.uniform(-size, size), x = random.uniform(-size, size);
+        return Vector3d(x, y, z);
       };
       std::vector<WorldState> starts(kThrows, start_of(scene));
       for (WorldState& start : starts) {

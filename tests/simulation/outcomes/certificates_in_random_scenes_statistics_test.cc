@@ -24,10 +24,13 @@ class RandomScene {
     scene->name = "random";
     scene->duration = 4.0;
     scene->supports.push_back(support("floor", {4.0, 4.0, 0.1}, {0.0, 0.0, -0.05 - between(0.1, 0.8)}));
-    const Vector3d table(between(0.2, 0.6), between(0.2, 0.6), between(0.02, 0.1));
+    const double thickness = between(0.02, 0.1), depth = between(0.2, 0.6), width = between(0.2, 0.6);
+    const Vector3d table(width, depth, thickness);
     scene->supports.push_back(support("table", table, {0.0, 0.0, -0.5 * table.z()}));
     if (chance(0.5)) {
-      const Vector3d block(between(0.02, 0.15), between(0.02, 0.3), between(0.005, 0.15));
+      const double block_height = between(0.005, 0.15), block_depth = between(0.02, 0.3),
+                   block_width = between(0.02, 0.15);
+      const Vector3d block(block_width, block_depth, block_height);
       scene->supports.push_back(support("block", block, {between(-0.2, 0.2), between(-0.2, 0.2), 0.5 * block.z()}));
     }
     const int objects = chance(0.6) ? 1 : 2;
