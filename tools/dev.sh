@@ -232,6 +232,7 @@ verb_format() {
 verb_lint() {
   verb_setup run develop
   timed "layer check" tools/check_layers
+  timed "draw check" tools/check_draws
   if [ "${1:-}" = --recent ]; then timed "format check" format_check; else timed "format check" format_check "$@"; fi
   timed "configure tidy" cmake --preset tidy --log-level=WARNING
   timed "generate headers" cmake --build build/tidy -j "$jobs" --target prescene_generated
