@@ -3,12 +3,12 @@
 // replace its allocator, and 0 otherwise.
 #pragma once
 
-#if defined(__has_feature)  // clang
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)  // g++
+#define PRESCENE_SANITIZES_MEMORY 1
+#elif defined(__clang__)  // headers of libraries define __has_feature for g++, as 0
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
 #define PRESCENE_SANITIZES_MEMORY 1
 #endif
-#elif defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define PRESCENE_SANITIZES_MEMORY 1
 #endif
 
 #if !defined(PRESCENE_SANITIZES_MEMORY)
