@@ -16,14 +16,11 @@ namespace prescene::service::query_fairness_test {
 namespace {
 
 using ::testing::HasSubstr;
+using tests::short_question;
 using tests::WorkerUnderTest;
 
 /// Goes on until it is cancelled.
 constexpr const char* kEndless = R"({"id": "endless", "predict": {"effort": {"exact_instances": 4000000}}})";
-
-std::string short_question(const std::string& id) {
-  return R"({"id": ")" + id + R"(", "stability": {"object": "box", "effort": {"exact_instances": 8}}})";
-}
 
 /// What is in work does not end by itself.
 QueryWorkerSettings patient(int at_once, std::atomic<bool>& has_begun) {
@@ -127,6 +124,7 @@ class QueryStream : public ::testing::Test {
     std::mutex mutex;
     std::vector<nlohmann::ordered_json> told;
     QueryWorkerSettings settings;
+    settings.most_seconds = 1e5;
     settings.on_answer_so_far = [&](const std::string& answer) {
       const std::lock_guard lock(mutex);
       told.push_back(parse_or_discard(answer));
@@ -169,7 +167,7 @@ TEST_F(QueryStream, TheAnswerIsTheSameButForSayingThatItIsFinal) {
 }
 
 TEST_F(QueryStream, WithoutAnIdNothingIsToldBeforeTheAnswer) {
-  const auto told = told_of(R"({"stream": true, "stability": {"object": "box"}})");
+  const auto told = told_of(R"({"stream": true, "stability": {"object": "box", "effort": {"exact_instances": 8}}})");
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].at("final"), true);
 }

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -14,6 +15,7 @@
 
 #include "prescene/service/live/query_worker.h"
 #include "prescene/service/load_scene.h"
+#include "prescene/service/outside_json.h"
 
 namespace prescene::tests {
 
@@ -44,6 +46,20 @@ inline std::shared_ptr<belief::Belief> belief_of(const char* scene_text) {
     known.particles[0].X_WO.rotation = geometry::Quaterniond::Identity();
   }
   return belief;
+}
+
+/// Is answered from so many instances however long they take, where the worker's own limit is far.
+inline std::string short_question(const std::string& id) {
+  return R"({"id": ")" + id + R"(", "stability": {"object": "box", "effort": {"exact_instances": 8}}})";
+}
+
+/// The answers by their ids, of which each is another. When one question is done the next one of its client begins, and
+/// its answer may come before that of the first has been handed over: no order of the two is promised.
+inline std::map<std::string, std::string> by_id(const std::vector<std::string>& answers) {
+  std::map<std::string, std::string> found;
+  for (const std::string& answer : answers)
+    EXPECT_TRUE(found.emplace(service::id_of(answer), answer).second) << "answered twice: " << answer;
+  return found;
 }
 
 /// Keeps the answers and waits for them.
@@ -85,6 +101,7 @@ class WorkerUnderTest {
     return answers_;
   }
   void turn_away(const std::string& id, const core::Status& reason) { worker_->turn_away(id, reason); }
+  void set_most_seconds(double seconds) { worker_->set_most_seconds(seconds); }
   void begin_session(core::TimeNs first_frame_ns) { worker_->begin_session(first_frame_ns); }
   service::QueryCounts counts() const { return worker_->counts(); }
 
