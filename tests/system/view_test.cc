@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -39,26 +38,26 @@ TEST(ViewVerb, APortInUseIsNamedWithTheRemedy) {
 TEST(ViewVerb, ServesThePageUntilItIsStopped) {
   const ScratchDir folder;
   const std::string recording = (folder.path() / "box.mcap").string();
-  const std::string out = (folder.path() / "err.txt").string();
   ASSERT_TRUE(record_scene(box_on_table("0.3"), {"scene.yaml", box_on_table("0.3"), 1, ""}, 10.0, recording).ok());
-  // A port that was free a moment ago.
-  const int port = [] {
-    const auto probe = WebServer::create({}, {}, {}, {});
-    return probe ? (*probe)->port() : 0;
-  }();
   for (const std::vector<std::string>& args :
        {std::vector<std::string>{"view", recording}, std::vector<std::string>{"view"}}) {
-    std::vector<std::string> with_port = args;
-    with_port.insert(with_port.end(), {"--port", std::to_string(port)});
-    BackgroundProgram program(with_port, {own_bus()});
-    std::string answer;
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (answer.empty() && std::chrono::steady_clock::now() < until) {
-      interfaces::WebClientSocket client(port, 0, /*must_connect=*/false);
-      client.send(interfaces::get_request("/"));
-      answer = client.read_all();
-      if (answer.empty()) std::this_thread::yield();
+    // It says which port it has got: one that was free a moment ago may be another's by now.
+    const std::filesystem::path said = folder.path() / ("said" + std::to_string(args.size()));
+    std::vector<std::string> words = {"-c", "exec \"$0\" \"$@\" >'" + said.string() + "'",
+                                      (build_dir() / "prescene").string()};
+    words.insert(words.end(), args.begin(), args.end());
+    words.insert(words.end(), {"--port", "0", "--json"});
+    BackgroundProgram program("/bin/sh", words, {own_bus()}, (folder.path() / "err.txt").string());
+    nlohmann::json ready;
+    while (!ready.is_object() && !program.has_ended()) {
+      std::this_thread::yield();
+      ready = nlohmann::json::parse(read_file(said), nullptr, false);
     }
+    ASSERT_TRUE(ready.is_object()) << read_file(folder.path() / "err.txt");
+    EXPECT_EQ(ready.value("state", ""), "ready");
+    interfaces::WebClientSocket client(ready.value("port", 0));
+    client.send(interfaces::get_request("/"));
+    const std::string answer = client.read_all();
     EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 ")) << answer;
     EXPECT_NE(answer.find("<title>Prescene</title>"), std::string::npos);
     EXPECT_EQ(program.stop(SIGINT), 0);

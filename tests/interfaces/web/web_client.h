@@ -12,9 +12,9 @@ namespace prescene::interfaces {
 
 class WebClientSocket {
  public:
-  /// Connects to a port of this machine; a test fails where it can't, unless it need not be. A small receive buffer
-  /// (bytes) makes the server feel soon that nothing is read.
-  explicit WebClientSocket(int port, int receive_buffer = 0, bool must_connect = true);
+  /// Connects to a port of this machine; a test fails where it can't. A small receive buffer (bytes) makes the server
+  /// feel soon that nothing is read.
+  explicit WebClientSocket(int port, int receive_buffer = 0);
   ~WebClientSocket();
   WebClientSocket(const WebClientSocket&) = delete;
   WebClientSocket& operator=(const WebClientSocket&) = delete;
