@@ -12,6 +12,7 @@
 
 #include "prescene/interfaces/scene_files/model_file.h"
 #include "prescene/service/calibration/motion_units.h"
+#include "tests/support/paths.h"
 #include "tests/support/simulated_motions.h"
 
 namespace prescene::tests {
@@ -29,14 +30,6 @@ using ::testing::HasSubstr;
 
 class ObjectCalibrationTest : public ::testing::Test {
  protected:
-  ObjectCalibrationTest()
-      : folder_(std::filesystem::path(::testing::TempDir()) /
-                (std::string("calibration_") + ::testing::UnitTest::GetInstance()->current_test_info()->name())),
-        backends_(pool_, automatic()) {
-    std::filesystem::create_directories(folder_);
-  }
-  ~ObjectCalibrationTest() override { std::filesystem::remove_all(folder_); }
-
   static service::BackendSettings automatic() {
     service::BackendSettings settings;
     settings.stepper = service::Stepper::kAutomatic;
@@ -50,9 +43,10 @@ class ObjectCalibrationTest : public ::testing::Test {
     return read.ok() ? "accepted" : std::string(read.status().message());
   }
 
-  std::filesystem::path folder_;
+  const ScratchDir scratch_;
+  const std::filesystem::path folder_ = scratch_.path();
   core::ThreadPool pool_{1};
-  service::Backends backends_;
+  service::Backends backends_{pool_, automatic()};
 };
 
 TEST_F(ObjectCalibrationTest, FitsAModelThatScenesCanUse) {

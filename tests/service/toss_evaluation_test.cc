@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "prescene/interfaces/scene_files/model_file.h"
+#include "tests/support/paths.h"
 #include "tests/support/simulated_motions.h"
 
 namespace prescene::tests::toss_evaluation_test {
@@ -29,14 +30,6 @@ using ::testing::HasSubstr;
 
 class TossEvaluationTest : public ::testing::Test {
  protected:
-  TossEvaluationTest()
-      : folder_(std::filesystem::path(::testing::TempDir()) /
-                (std::string("evaluation_") + ::testing::UnitTest::GetInstance()->current_test_info()->name())),
-        backends_(pool_, automatic()) {
-    std::filesystem::create_directories(folder_);
-  }
-  ~TossEvaluationTest() override { std::filesystem::remove_all(folder_); }
-
   static service::BackendSettings automatic() {
     service::BackendSettings settings;
     settings.stepper = service::Stepper::kAutomatic;
@@ -76,9 +69,10 @@ class TossEvaluationTest : public ::testing::Test {
     return folder_ / "truth.yaml";
   }
 
-  std::filesystem::path folder_;
+  const ScratchDir scratch_;
+  const std::filesystem::path folder_ = scratch_.path();
   core::ThreadPool pool_{1};
-  service::Backends backends_;
+  service::Backends backends_{pool_, automatic()};
 };
 
 TEST_F(TossEvaluationTest, TheTruthHoldsWhatItsRegionsPromise) {

@@ -9,6 +9,7 @@
 
 #include "prescene/service/backends.h"
 #include "program.h"
+#include "tests/support/paths.h"
 #include "tests/support/simulated_motions.h"
 
 namespace prescene::tests {
@@ -18,10 +19,7 @@ using ::testing::HasSubstr;
 
 class CalibrateTest : public ::testing::Test {
  protected:
-  CalibrateTest()
-      : folder_(std::filesystem::path(::testing::TempDir()) /
-                (std::string("calibrate_") + ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
-    std::filesystem::create_directories(folder_);
+  CalibrateTest() {
     core::ThreadPool pool(1);
     service::Backends backends(pool);
     const belief::Scene scene = box_scene({});
@@ -32,7 +30,6 @@ class CalibrateTest : public ::testing::Test {
     write_file(folder_ / "tosses.csv", motion_table(simulated_slides(
                                            scene, **simulator, 6, core::RandomStream(1, core::Purpose::kTest), pool)));
   }
-  ~CalibrateTest() override { std::filesystem::remove_all(folder_); }
 
   std::vector<std::string> command(const std::string& output) const {
     std::vector<std::string> args = {"calibrate", folder_.string(), "-o", output, "--json", "-q"};
@@ -43,7 +40,8 @@ class CalibrateTest : public ::testing::Test {
     return args;
   }
 
-  std::filesystem::path folder_;
+  const ScratchDir scratch_;
+  const std::filesystem::path folder_ = scratch_.path();
 };
 
 TEST_F(CalibrateTest, WritesAModelThatValidates) {

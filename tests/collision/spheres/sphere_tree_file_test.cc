@@ -15,6 +15,7 @@
 #include "prescene/collision/tree_file_seal.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
+#include "tests/support/paths.h"
 
 namespace prescene::collision::sphere_tree_file_test {
 namespace {
@@ -24,13 +25,10 @@ using ::testing::HasSubstr;
 class SphereTreeFile : public ::testing::Test {
  protected:
   void SetUp() override {
-    path_ = std::filesystem::path(::testing::TempDir()) /
-            ("sphere_tree_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
     packed_ = *pack_spheres(*mesh_, packing_options_, pool_);
     tree_ = *SphereTree::make(packed_.packing, tree_options_, pool_);
     ASSERT_TRUE(write_sphere_tree(path_, *mesh_, packing_options_, *tree_, packed_.report).ok());
   }
-  void TearDown() override { std::filesystem::remove(path_); }
 
   std::vector<std::uint8_t> bytes() const {
     std::ifstream file(path_, std::ios::binary);
@@ -45,7 +43,8 @@ class SphereTreeFile : public ::testing::Test {
   std::shared_ptr<const Mesh> mesh_ = *Mesh::make(geometry::make_mesh(geometry::Cone{0.1, 0.2}), "cone");
   PackingOptions packing_options_{.max_spheres = 100, .edge_fidelity = 0.01};
   SphereTreeOptions tree_options_{.branching = 8};
-  std::filesystem::path path_;
+  const tests::ScratchDir folder_;
+  const std::filesystem::path path_ = folder_.path() / "tree";
   PackedMesh packed_;
   std::shared_ptr<const SphereTree> tree_;
 };
