@@ -177,6 +177,8 @@ void DdsNode::Impl::take(Subscription& subscription) {
     }
     subscription.has_more = count == static_cast<dds_return_t>(kBatch) && !stopping;
   }
+  // What came after that may have pushed out more, and nothing else may come: it is looked at once more.
+  if (!stopping && subscription.arrived.load(std::memory_order_acquire) != arrived) subscription.has_more = true;
   count_losses(subscription, arrived);
 }
 
