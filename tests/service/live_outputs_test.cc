@@ -60,10 +60,6 @@ class LiveOutputsTest : public LiveServiceTest {
       events.push_back(nlohmann::ordered_json::parse(text.data));
     return events;
   }
-  bool has_event(const std::string& word) {
-    const auto all = events();
-    return std::any_of(all.begin(), all.end(), [&](const auto& event) { return event.at("event") == word; });
-  }
 
   std::mutex mutex_;
   std::map<std::string, std::vector<std::vector<std::uint8_t>>> received_;
@@ -85,11 +81,14 @@ TEST_F(LiveOutputsTest, EventsTellOfTheObjectAndOfTheClock) {
   start();
   // Whoever comes late misses the first events; a belief that begins anew tells them again.
   ASSERT_TRUE(tracks_from(kNoon));
-  ASSERT_TRUE(robot_.send_until([&] { return has_event("clock_set_back"); }, kNoon - 3600 * kSecond));
-  const auto all = events();
-  const auto began =
-      std::find_if(all.begin(), all.end(), [](const auto& e) { return e.at("event") == "clock_set_back"; });
-  ASSERT_NE(began + 1, all.end());
+  std::vector<nlohmann::ordered_json> all;
+  auto began = all.end();
+  const auto has_begun_anew = [&] {
+    all = events();
+    began = std::find_if(all.begin(), all.end(), [](const auto& e) { return e.at("event") == "clock_set_back"; });
+    return all.end() - began >= 2;  // the events of one step come one by one
+  };
+  ASSERT_TRUE(robot_.send_until(has_begun_anew, kNoon - 3600 * kSecond));
   EXPECT_EQ((began + 1)->at("event"), "found");
   EXPECT_EQ((began + 1)->at("object"), "box");
   EXPECT_TRUE((began + 1)->at("from").is_null());
@@ -220,7 +219,8 @@ TEST_F(LiveOutputsTest, AQuestionAsAMessageIsAnsweredAsMessageAndAsJson) {
   const auto texts = heard<interfaces::RosString>(kAnswerTopic);
   EXPECT_TRUE(std::any_of(texts.begin(), texts.end(), [&](const auto& text) { return text.data == where.json; }));
 
-  ASSERT_TRUE(asked({"s", "stability", "box", 0.5, 0.2, false, {}, ""}));
+  // However long so many instances take: a busy machine may not have simulated one in a time that is given.
+  ASSERT_TRUE(asked({"s", "stability", "box", 0.5, 0.0, false, {}, R"({"effort": {"exact_instances": 8}})"}));
   ASSERT_EQ(answer_to("s")->estimates.size(), 1U);
   EXPECT_EQ(answer_to("s")->estimates[0].subject, "box");
 

@@ -57,7 +57,8 @@ class LiveServiceTest : public ::testing::Test {
     return status_;
   }
 
-  /// Sends frames from `stamp_ns` on until one of that time and its successors was stepped `count` times.
+  /// Sends frames from `stamp_ns` on until one of that time and its successors was stepped `count` times, and something
+  /// is known from the diagnostics.
   bool tracks_from(core::TimeNs stamp_ns, std::size_t count = 3) {
     const std::size_t before = robot_.beliefs().size();
     return robot_.send_until(
@@ -68,7 +69,7 @@ class LiveServiceTest : public ::testing::Test {
             const auto summary = belief_summary_from_json(beliefs[i]);
             if (summary && summary->stamp_ns >= stamp_ns && summary->stamp_ns < stamp_ns + 600 * kSecond) ++found;
           }
-          return found >= count;
+          return found >= count && !robot_.diagnosis().empty();
         },
         stamp_ns);
   }

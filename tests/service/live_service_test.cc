@@ -71,6 +71,7 @@ TEST_F(LiveServiceTest, TracksPublishesAndAnswers) {
 }
 
 TEST_F(LiveServiceTest, WhatIsKnownSoFarComesOverTheBusBeforeTheAnswer) {
+  adjust_ = [](LiveSettings& settings) { settings.worker.most_seconds = 600.0; };  // for a busy machine
   start();
   ASSERT_TRUE(tracks_from(kNoon, 6));
   std::vector<nlohmann::ordered_json> told;  // until the answer
@@ -81,13 +82,16 @@ TEST_F(LiveServiceTest, WhatIsKnownSoFarComesOverTheBusBeforeTheAnswer) {
         told.clear();
         for (const std::string& answer : robot_.answers()) {
           told.push_back(nlohmann::ordered_json::parse(answer));
-          if (told.back().at("final") == true) return true;
+          if (told.back().value("final", false)) return true;
         }
         return false;
       },
       kNoon + 1000 * kSecond));
   ASSERT_GE(told.size(), 2U);
-  for (const auto& answer : told) EXPECT_EQ(answer.at("id"), "s");
+  for (const auto& answer : told) {
+    EXPECT_EQ(answer.at("id"), "s");
+    ASSERT_TRUE(answer.contains("stability")) << answer;
+  }
   EXPECT_EQ(told.front().at("final"), false);
   EXPECT_LT(told.front().at("stability").at("instances"), 200);
   EXPECT_EQ(told.back().at("stability").at("instances"), 200);
@@ -115,7 +119,8 @@ TEST_F(LiveServiceTest, ServicesAnswerAndRestart) {
   const auto asked = ask.call(R"({"where": {"object": "box"}})");
   ASSERT_TRUE(asked.has_value());
   EXPECT_TRUE(asked->success) << asked->text;
-  const auto streamed = ask.call(R"({"stream": true, "stability": {"object": "box"}})");
+  const auto streamed =
+      ask.call(R"({"stream": true, "stability": {"object": "box", "effort": {"exact_instances": 8}}})");
   ASSERT_TRUE(streamed.has_value());
   EXPECT_THAT(streamed->text, HasSubstr("\"final\":true")) << "a service replies with the answer only";
   for (const char* nonsense : {"", "no JSON", "[]", R"({"where": 7})", R"({"stability": {"object": "nobody"}})"}) {
@@ -174,10 +179,10 @@ TEST_F(LiveServiceTest, SaysHowSimulatedTimeGoes) {
   start(nullptr, kClockTopic);
   // Complete frames are used, but for all that the service knows no time passes.
   ASSERT_TRUE(tracks_from(kNoon));
-  EXPECT_THAT(robot_.diagnosis(), HasSubstr("no simulated time has come on /clock"));
   const auto says = [&](const std::string& text) {
     return robot_.send_until([&] { return robot_.diagnosis().find(text) != std::string::npos; }, kNoon + kSecond);
   };
+  EXPECT_TRUE(says("no simulated time has come on /clock")) << robot_.diagnosis();
   robot_.send_clock(5 * kSecond);
   EXPECT_TRUE(robot_.send_until(
       [&] {
