@@ -11,10 +11,9 @@
 
 namespace prescene::interfaces {
 
-WebClientSocket::WebClientSocket(int port, int receive_buffer)
-    : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
+WebClientSocket::WebClientSocket(int port, int receive_buffer) : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
   if (receive_buffer > 0) setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
-  const timeval patience{20, 0};
+  const timeval patience{60, 0};
   setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
   sockaddr_in address{};

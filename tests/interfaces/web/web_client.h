@@ -21,7 +21,7 @@ class WebClientSocket {
 
   /// False where the connection is closed.
   bool send(std::string_view bytes);
-  /// So many bytes; fewer where the connection ends first. Waits at most 20 s.
+  /// So many bytes; fewer where the connection ends first. Waits at most a minute.
   std::string read(std::size_t bytes);
   /// Up to the end of the connection.
   std::string read_all();
