@@ -188,7 +188,9 @@ TEST_F(Session, AReplayWithoutAFrameOfUseSaysWhy) {
 }
 
 TEST_F(Session, ServesAnswersSurvivesBeingKilledAndReplaysItsSessionBitForBit) {
-  const std::vector<std::string> serve = {"serve", "--scene", path("scene.yaml")};
+  // A busy machine may take its time for a question.
+  const std::vector<std::string> serve = {
+      "serve", "--scene", path("scene.yaml"), "--question-seconds", "10", "--most-question-seconds", "60"};
   const std::vector<std::string> replay = {"replay", path("run.mcap"), "--over-dds",
                                            "--json", "--ask",          R"(1.0:{"where": {}})"};
   {
