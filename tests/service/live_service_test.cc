@@ -427,7 +427,7 @@ TEST_F(LiveServiceTest, LogsARepeatedFaultOnceInAWhile) {
   }
   EXPECT_TRUE(robot_.send_until([&] { return robot_.diagnostics()["lines not logged"] != "0"; }, kNoon + kSecond));
   EXPECT_TRUE(stop().ok());
-  EXPECT_LT(log_.size(), 60u);
+  EXPECT_LT(log_.size(), 200u) << "twenty at once and one in two seconds, however long this takes";
 }
 
 }  // namespace

@@ -30,6 +30,9 @@ TEST(LiveView, ShowsTheNewestStep) {
     ASSERT_GT(next, shown);
     shown = next;
   }
+  // The picture of a step comes after it, and before the next one.
+  view->show(tests::shown_step(51));
+  EXPECT_EQ(page.next("step")["step"], 51);
   view->set_health("tracking");
   EXPECT_EQ(page.next("health")["text"], "tracking");
   EXPECT_FALSE(page.picture.empty());
