@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/interfaces/bytes/text.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+
+#include "prescene/core/utf8.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -16,21 +19,49 @@ bool parse_whole(std::string_view text, Number* value) {
   return result.ec == std::errc() && result.ptr == text.data() + text.size();
 }
 
+void append_escaped(std::string_view bytes, std::string& out) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  for (const char c : bytes) {
+    const auto byte = static_cast<unsigned char>(c);
+    out += "\\x";
+    out += kDigits[byte / 16];
+    out += kDigits[byte % 16];
+  }
+}
+
+/// C0, DEL, and C1, whose U+009B begins a command as the escape does.
+bool is_control(char32_t character) { return character < 0x20 || (character >= 0x7f && character < 0xa0); }
+
+/// Fit for a terminal; with `keeps_layout`, line ends and tabs stay.
+std::string without_controls(std::string_view text, bool keeps_layout) {
+  std::string out;
+  out.reserve(text.size());
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t length = core::utf8_length_at(text, i);
+    const std::string_view character = text.substr(i, std::max<std::size_t>(length, 1));
+    const bool is_layout = keeps_layout && (text[i] == '\n' || text[i] == '\t');
+    if (length == 0 || (is_control(core::utf8_character_at(text, i)) && !is_layout))
+      append_escaped(character, out);
+    else
+      out += character;
+    i += character.size();
+  }
+  return out;
+}
+
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\f' || c == '\v'; }
 
 }  // namespace
 
 std::string quote(std::string_view text, std::size_t max_characters) {
   std::string out = "'";
-  for (const char c : text.substr(0, max_characters)) {
+  for (const char& c : text.substr(0, max_characters)) {
     const auto byte = static_cast<unsigned char>(c);
     if (c == '\'' || c == '\\') {
       out += '\\';
       out += c;
     } else if (byte < 0x20 || byte >= 0x7f) {
-      std::array<char, 5> escape{};
-      std::snprintf(escape.data(), escape.size(), "\\x%02x", byte);
-      out += escape.data();
+      append_escaped({&c, 1}, out);
     } else {
       out += c;
     }
@@ -38,6 +69,9 @@ std::string quote(std::string_view text, std::size_t max_characters) {
   out += text.size() > max_characters ? "...'" : "'";
   return out;
 }
+
+std::string printable(std::string_view text) { return without_controls(text, false); }
+std::string printable_lines(std::string_view text) { return without_controls(text, true); }
 
 std::string number_text(double value) {
   // Shortest text would write 200000 as 2e+05, which people read less easily.

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include <dds/ddsrt/log.h>
-#include "prescene/core/utf8.h"
+#include "prescene/interfaces/bytes/text.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -40,20 +40,9 @@ core::LogLevel level_of(std::uint32_t priority) {
   return (priority & DDS_LC_WARNING) != 0 ? core::LogLevel::kWarning : core::LogLevel::kInfo;
 }
 
-/// One line of text: there may be bytes in it that a peer sent.
+/// There may be bytes in it that a peer sent.
 std::string line_of(std::string_view said) {
-  std::string line = "Cyclone DDS: ";
-  said = said.substr(0, said.find_last_not_of(" \n") + 1);
-  for (std::size_t i = 0; i < said.size();) {
-    const std::size_t length = core::utf8_length_at(said, i);
-    const auto byte = static_cast<unsigned char>(said[i]);
-    if (length == 0 || byte < 0x20 || byte == 0x7f)
-      line += '?';
-    else
-      line += said.substr(i, length);
-    i += std::max<std::size_t>(length, 1);
-  }
-  return line;
+  return "Cyclone DDS: " + printable(said.substr(0, said.find_last_not_of(" \n") + 1));
 }
 
 void pass_on(const dds_log_data_t& said) {

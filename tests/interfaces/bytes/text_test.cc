@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "prescene/core/utf8.h"
+
 namespace prescene::interfaces {
 namespace {
 
@@ -17,6 +19,29 @@ TEST(Quote, HidesTerminalEscapesAndCutsLongText) {
   EXPECT_EQ(quote("\xff"), "'\\xff'");
   EXPECT_EQ(quote("abcdef", 3), "'abc...'");
   EXPECT_EQ(quote("abc", 3), "'abc'");
+}
+
+TEST(Printable, EscapesWhatATerminalWouldObeyAndNothingElse) {
+  EXPECT_EQ(printable("T\xc3\xbcr 'a\\b'"), "T\xc3\xbcr 'a\\b'");
+  EXPECT_EQ(printable("a\x1b[31m\r\n\tb\x7f"), "a\\x1b[31m\\x0d\\x0a\\x09b\\x7f");
+  EXPECT_EQ(printable("\xc2\x9b\x32J\xc2\xa0"), "\\xc2\\x9b2J\xc2\xa0") << "U+009B is a control, U+00A0 a space";
+  EXPECT_EQ(printable("\xff\xe2\x82"), "\\xff\\xe2\\x82") << "neither is UTF-8";
+  EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a\\x00b");
+  EXPECT_EQ(printable_lines("a\x1b\n\tb\r\n"), "a\\x1b\n\tb\\x0d\n");
+}
+
+TEST(Printable, LeavesNoControlByteOfAnyOneOrTwoBytes) {
+  for (int a = 0; a < 256; ++a)
+    for (int b = 0; b < 256; ++b) {
+      const std::string text = {static_cast<char>(a), static_cast<char>(b)};
+      const std::string shown = printable(text);
+      EXPECT_TRUE(core::is_utf8(shown)) << a << " " << b;
+      for (std::size_t i = 0; i < shown.size(); i += core::utf8_length_at(shown, i)) {
+        const char32_t character = core::utf8_character_at(shown, i);
+        EXPECT_FALSE(character < 0x20 || (character >= 0x7f && character < 0xa0)) << a << " " << b;
+      }
+      EXPECT_EQ(printable(shown), shown) << a << " " << b;
+    }
 }
 
 TEST(NumberText, ReadsBackAsTheSameNumber) {

@@ -12,6 +12,12 @@ namespace prescene::interfaces {
 /// `max_characters` of the text.
 std::string quote(std::string_view text, std::size_t max_characters = 64);
 
+/// One line that any terminal shows: `\xNN` for each byte of control characters (U+0000 to U+001F, U+007F to U+009F)
+/// and of what is not UTF-8; all else, backslashes too, as it is, of any length.
+std::string printable(std::string_view text);
+/// The same of a text of several lines: line ends and tabs stay.
+std::string printable_lines(std::string_view text);
+
 /// "3", "0.25", "1e-09": a short text that reads back as the same number; "nan", "inf", "-inf".
 std::string number_text(double value);
 
