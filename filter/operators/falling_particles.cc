@@ -222,7 +222,7 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const Wo
     }
     const belief::ObjectState& end = run.final().objects[place];
     Particle& particle = object.particles[falling[i].particle];
-    if (falling[i].woken && object.state == belief::TrackState::kTracked) {
+    if (falling[i].keeps_pose) {
       take_if_pushed(end, belief.scene->gravity_W, options, particle, report);
       ++report.simulated;
       continue;

@@ -20,6 +20,8 @@ struct Falling {
   Pose X_WO;             ///< Where constant velocity takes it, ...
   geometry::Twist V_WO;  ///< ... and how fast it is then.
   bool woken = false;    ///< It rested, and something may push it: it rests on where physics does not move it.
+  /// With woken: it is seen, so that it keeps its pose unless something pushes it.
+  bool keeps_pose = false;
   /// If nothing shows where it goes: its covariance if it has not moved. Physics that leaves it where it is adds no
   /// doubt.
   std::optional<belief::Matrix12d> covariance_at_rest = std::nullopt;

@@ -335,7 +335,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
       if (particle.mode == MotionMode::kResting) {
         add_noise(tracked ? kStillNoise : options.resting, dt, particle.covariance);
         if (may_be_pushed && physics_draw < physics_share && may_touch(movers, particle.X_WO * centre, radius))
-          falling.push_back({i, k, dt, particle.X_WO, particle.V_WO, true});
+          falling.push_back({i, k, dt, particle.X_WO, particle.V_WO, /*woken=*/true, /*keeps_pose=*/tracked});
       } else if (left > 0.0) {
         // What is seen and may be still goes nowhere in one step that its velocity does not say.
         const bool idle = tracked && !released && may_be_still(particle);
