@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "db3_rows.h"
+#include "prescene/interfaces/bags/other_encodings.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/bytes/text.h"
 
@@ -84,10 +85,9 @@ struct Db3Reader::Impl {
   Db3Statement message;  ///< One of them.
   std::vector<McapChannel> channels;
   std::map<std::int64_t, int> channel_of_topic;
-  std::set<std::int64_t> left_out_topics;
-  std::set<std::string> other_formats;  // the first of them
-  bool has_more_formats = false;
-  std::uint64_t damaged = 0, stray = 0, in_other_formats = 0;
+  std::map<std::int64_t, std::pair<std::string, std::string>> left_out_topics;  // their names and encodings
+  OtherEncodings other_encodings;
+  std::uint64_t damaged = 0, stray = 0;
   bool ended = false;
 
   Status open_database();
@@ -219,12 +219,7 @@ Status Db3Reader::Impl::read_topics() {
     if (channel_of_topic.contains(id) || left_out_topics.contains(id))
       return core::data_loss(path.string() + ": two topics have the number " + std::to_string(id) + kDb3Remedy);
     if (format != "cdr") {
-      left_out_topics.insert(id);
-      const std::string other = name + " (" + quote(format, 40) + ")";
-      if (other_formats.size() < 10)
-        other_formats.insert(other);
-      else if (!other_formats.contains(other))
-        has_more_formats = true;
+      left_out_topics.emplace(id, std::pair(name, format));
       continue;
     }
     channel_of_topic.emplace(id, static_cast<int>(channels.size()));
@@ -255,8 +250,8 @@ Result<bool> Db3Reader::Impl::read_message(const Db3Row& at, McapMessage* out) {
     return false;
   }
   const std::int64_t topic = sqlite3_column_int64(message.get(), 0);
-  if (left_out_topics.contains(topic)) {
-    ++in_other_formats;
+  if (const auto left_out = left_out_topics.find(topic); left_out != left_out_topics.end()) {
+    other_encodings.note(left_out->second.first, left_out->second.second);
     return false;
   }
   const auto channel = channel_of_topic.find(topic);
@@ -329,12 +324,7 @@ std::string Db3Reader::loss_text() const {
   if (impl.found.too_many) say("only the first " + std::to_string(impl.found.rows.size()) + " messages were looked at");
   if (impl.damaged > 0) say(std::to_string(impl.damaged) + " damaged messages were left out");
   if (impl.stray > 0) say(std::to_string(impl.stray) + " messages of unknown topics were left out");
-  if (!impl.other_formats.empty()) {
-    std::string names;
-    for (const std::string& name : impl.other_formats) names += (names.empty() ? "" : ", ") + name;
-    say(std::to_string(impl.in_other_formats) + " messages that are not in CDR were left out: " + names +
-        (impl.has_more_formats ? " and others" : ""));
-  }
+  if (const std::string others = impl.other_encodings.text(); !others.empty()) say(others);
   return out;
 }
 

@@ -56,7 +56,8 @@ class Overview {
     }
     row.last = at;
     row.bytes += message.data.size();
-    if (std::string_view(of) == "robot" && !other_encodings_.note(channel)) look_into(message, topic);
+    if (std::string_view(of) == "robot" && !other_encodings_.note(channel.topic, channel.message_encoding))
+      look_into(message, topic);
   }
 
   RecordingOverview finish() {
@@ -210,7 +211,7 @@ class Overview {
   }
 
   RecordingOverview out_;
-  OtherEncodings other_encodings_;
+  interfaces::OtherEncodings other_encodings_;
   std::map<std::tuple<std::string, std::string, std::string>, Topic> topics_;
   std::map<std::string, RecordedImages> images_;
   std::map<std::string, RecordedCamera> cameras_;

@@ -169,26 +169,6 @@ std::string RecordingReader::loss_text() const {
   return text;
 }
 
-bool OtherEncodings::note(const interfaces::McapChannel& channel) {
-  constexpr std::size_t kMostNamed = 10;
-  if (channel.message_encoding == "cdr") return false;
-  const std::string name = channel.topic + " (" + interfaces::quote(channel.message_encoding, 40) + ")";
-  if (channels_.size() < kMostNamed)
-    channels_.insert(name);
-  else if (!channels_.contains(name))
-    has_more_ = true;
-  ++messages_;
-  return true;
-}
-
-std::string OtherEncodings::text() const {
-  if (messages_ == 0) return "";
-  std::string names;
-  for (const std::string& name : channels_) names += (names.empty() ? "" : ", ") + name;
-  return std::to_string(messages_) + " messages that are not in CDR were left out: " + names +
-         (has_more_ ? " and others" : "");
-}
-
 /// The message nearest to the one expected whose number has these lower bits.
 MessageIndex RecordingReader::index_of(std::uint32_t sequence) {
   if (is_numbered_) {
@@ -296,7 +276,7 @@ core::Result<std::optional<RecordedEntry>> RecordingReader::next() {
       mark_start(*entry);
       return entry;
     }
-    if (other_encodings_.note(channel)) continue;
+    if (other_encodings_.note(channel.topic, channel.message_encoding)) continue;
     RecordedEntry entry;
     entry.message = {channel.topic, channel.schema.name, std::move(message->data), message->publish_time_ns,
                      message->log_time_ns};

@@ -177,19 +177,14 @@ TEST_F(Bags, WhatCanNotBeASqliteFileIsSaid) {
   EXPECT_EQ(failure_of(path("a.db3")).code(), StatusCode::kInvalidInput);
 }
 
-TEST_F(Bags, OfManyTopicsThatAreNotInCdrTenAreNamed) {
-  for (const int count : {10, 11}) {
-    const auto file = path(std::to_string(count) + ".db3");
-    std::vector<tests::Db3Topic> topics;
-    for (int i = 0; i < count; ++i) topics.push_back({"/t" + std::to_string(i), "x/msg/Y", "json"});
-    tests::write_db3(file, topics, {{1, 10, {1}}});
-    const auto reader = BagReader::open(file);
-    ASSERT_TRUE(reader.ok());
-    EXPECT_TRUE(read_all(**reader).empty());
-    EXPECT_THAT((*reader)->loss_text(), HasSubstr("1 messages that are not in CDR were left out: /t0 ('json'), "));
-    EXPECT_EQ((*reader)->loss_text().find("/t10 ("), std::string::npos);
-    EXPECT_EQ((*reader)->loss_text().ends_with(" and others"), count == 11) << (*reader)->loss_text();
-  }
+TEST_F(Bags, TopicsOfADb3ThatAreNotInCdrAreNamedWhereTheyHaveMessages) {
+  const auto file = path("other.db3");
+  tests::write_db3(file, {{"/a", "x/msg/Y", "json"}, {"/none", "x/msg/Y", "json"}, {"/b", "x/msg/Y", "ros1"}},
+                   {{3, 10, {1}}, {1, 20, {1}}, {3, 30, {1}}});
+  const auto reader = BagReader::open(file);
+  ASSERT_TRUE(reader.ok());
+  EXPECT_TRUE(read_all(**reader).empty());
+  EXPECT_EQ((*reader)->loss_text(), "3 messages that are not in CDR were left out: '/a' ('json'), '/b' ('ros1')");
 }
 
 TEST_F(Bags, OddMessagesAreRefusedOrCounted) {
@@ -200,7 +195,7 @@ TEST_F(Bags, OddMessagesAreRefusedOrCounted) {
   ASSERT_TRUE(reader.ok());
   EXPECT_THAT(read_all(**reader), ElementsAre("/a 10 1", "/a 40 4"));
   EXPECT_THAT((*reader)->loss_text(), HasSubstr("1 messages of unknown topics"));
-  EXPECT_THAT((*reader)->loss_text(), HasSubstr("1 messages that are not in CDR were left out: /json ('json')"));
+  EXPECT_THAT((*reader)->loss_text(), HasSubstr("1 messages that are not in CDR were left out: '/json' ('json')"));
   tests::run_sql(file, "INSERT INTO messages(topic_id, timestamp, data) VALUES(1, -5, 'text'), (1, 'noon', 'text')");
   EXPECT_EQ(failure_of(file).code(), StatusCode::kDataLoss);
   const auto salvaging = BagReader::open(file, {.salvage = true});

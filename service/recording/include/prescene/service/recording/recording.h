@@ -10,13 +10,13 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "prescene/interfaces/bags/bag_reader.h"
+#include "prescene/interfaces/bags/other_encodings.h"
 #include "prescene/interfaces/dds/dds_node.h"
 #include "prescene/interfaces/mcap/mcap_writer.h"
 #include "prescene/service/load_scene.h"
@@ -176,20 +176,6 @@ struct RecordingReadOptions {
   bool all_parts = false;  ///< Of a recording of several files, also those after this one (parts_after()).
 };
 
-/// Counts what of a recording is not in CDR, as messages of ROS 1, protobuf or JSON of other programs are.
-class OtherEncodings {
- public:
-  /// Whether a message of this channel can't be read.
-  bool note(const interfaces::McapChannel& channel);
-  /// A sentence; empty = there are none.
-  std::string text() const;
-
- private:
-  std::uint64_t messages_ = 0;
-  std::set<std::string> channels_;  // the first of them
-  bool has_more_ = false;
-};
-
 /// Reads our recordings, and those of ROS 2 (interfaces::BagReader).
 class RecordingReader {
  public:
@@ -262,7 +248,7 @@ class RecordingReader {
   bool is_numbered_ = false;         // sequences are the lower bits of the messages' numbers
   std::uint64_t too_long_json_ = 0;  // left out
   std::uint64_t damaged_json_ = 0;   // the same
-  OtherEncodings other_encodings_;   // the same
+  interfaces::OtherEncodings other_encodings_;
   MessageIndex next_index_ = 0;
 };
 
