@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <new>
 #include <set>
 
 #include "prescene/core/random.h"
@@ -153,6 +154,39 @@ TEST(FairQueue, TakingOutTakesNoMemory) {
   EXPECT_EQ(*second->client, other);
   EXPECT_EQ(*third->client, one);
   EXPECT_EQ(third->item, std::string(100, '2'));
+}
+
+// At each allocation of a push in turn: what waited before is served as if nothing had come, and nothing else waits.
+TEST(FairQueue, APushThatFindsNoMemoryChangesNothing) {
+  if (!tests::can_count_allocations()) GTEST_SKIP() << "sanitizers bring an allocator of their own";
+  const std::string names[] = {std::string(100, 'a'), std::string(100, 'b')};  // too long to be kept without memory
+  int failures = 0;
+  for (const FairLimits& limits : {FairLimits{50, 50, 5000}, FairLimits{2, 50, 5000}, FairLimits{50, 2, 5000}}) {
+    for (const std::string& client : names) {
+      for (std::uint64_t after = 0;; ++after) {
+        FairQueue<std::string> queue(limits);
+        queue.push(names[0], std::string(100, '1'), 30);
+        queue.push(names[0], std::string(100, '2'), 20);
+        std::string item(100, '3');
+        bool failed = false;
+        tests::fail_allocation_after(after);
+        try {
+          queue.push(client, std::move(item), 10);
+        } catch (const std::bad_alloc&) {
+          failed = true;
+        }
+        tests::stop_failing_allocations();
+        if (!failed) break;
+        ++failures;
+        EXPECT_EQ(queue.size(), 2U);
+        EXPECT_TRUE(queue.push(names[1], std::string(100, '4'), 1).size() == (limits.of_all == 2 ? 1U : 0U));
+        std::string served;
+        while (const auto next = queue.pop()) served += (*next->client)[0] + next->item.substr(0, 1);
+        EXPECT_EQ(served, limits.of_all == 2 ? "a1b4" : "a1b4a2");
+      }
+    }
+  }
+  EXPECT_GE(failures, 6);
 }
 
 TEST(FairQueue, WhoMayNotGoIsPassedOverAndKeepsTheTurn) {

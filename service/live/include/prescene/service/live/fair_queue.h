@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <deque>
+#include <list>
 #include <map>
 #include <memory>
 #include <optional>
@@ -45,15 +46,12 @@ class FairQueue {
 
   /// Adds an item behind the others of the client. What finds no room is given back: the item itself where the client
   /// has as many as it may, and where all together are too many, the newest of whoever has most of them (of equals, the
-  /// one that comes now).
+  /// one that comes now). Where memory ends (std::bad_alloc), the item is gone and the queue as it was.
   std::vector<Refused> push(const std::string& client, Item item, std::size_t bytes) {
     std::vector<Refused> refused;
-    Waiting& own = clients_[client];
-    if (!own.has_turn) {
-      turns_.push_back(std::make_shared<const std::string>(client));
-      own.has_turn = true;
-    }
-    own.items.push_back({std::move(item), bytes});
+    if (count_ >= std::min(limits_.of_client, limits_.of_all) || bytes_ + bytes > limits_.bytes_of_all)
+      refused.reserve(count_ + 1);
+    Waiting& own = add(client, {std::move(item), bytes});
     own.bytes += bytes;
     bytes_ += bytes;
     ++count_;
@@ -70,25 +68,16 @@ class FairQueue {
   /// no memory, so that where that has ended what waits is served all the same.
   template <class MayGo>
   std::optional<Entry> pop_if(const MayGo& may_go) {
-    for (std::size_t i = 0; i < turns_.size();) {
-      const auto turn = turns_.begin() + static_cast<std::ptrdiff_t>(i);
+    for (auto turn = turns_.begin(); turn != turns_.end(); ++turn) {
       const auto found = clients_.find(**turn);
       Waiting& waiting = found->second;
-      if (waiting.items.empty()) {  // no memory was left for its first item
-        clients_.erase(found);
-        turns_.erase(turn);
-        continue;
-      }
-      if (!may_go(std::as_const(**turn), std::as_const(waiting.items.front().item))) {
-        ++i;
-        continue;
-      }
+      if (!may_go(std::as_const(**turn), std::as_const(waiting.items.front().item))) continue;
       Entry entry{*turn, std::move(waiting.items.front().item)};
       count_ -= 1;
       bytes_ -= waiting.items.front().bytes;
       waiting.bytes -= waiting.items.front().bytes;
       waiting.items.pop_front();
-      std::rotate(turn, turn + 1, turns_.end());  // behind all others
+      turns_.splice(turns_.end(), turns_, turn);  // behind all others
       if (waiting.items.empty()) {
         clients_.erase(found);
         turns_.pop_back();
@@ -141,8 +130,21 @@ class FairQueue {
   struct Waiting {
     std::deque<Sized> items;
     std::size_t bytes = 0;
-    bool has_turn = false;
   };
+
+  /// All that takes memory comes before the first change, or is the change itself.
+  Waiting& add(const std::string& client, Sized one) {
+    if (const auto found = clients_.find(client); found != clients_.end()) {
+      found->second.items.push_back(std::move(one));
+      return found->second;
+    }
+    std::map<std::string, Waiting> fresh;
+    fresh[client].items.push_back(std::move(one));
+    std::list<std::shared_ptr<const std::string>> turn;
+    turn.push_back(std::make_shared<const std::string>(client));
+    turns_.splice(turns_.end(), turn);
+    return clients_.insert(fresh.extract(fresh.begin())).position->second;
+  }
 
   /// Else clients that are refused while nothing is taken out would add up.
   void forget_empty() {
@@ -174,7 +176,7 @@ class FairQueue {
 
   FairLimits limits_;
   std::map<std::string, Waiting> clients_;
-  std::deque<std::shared_ptr<const std::string>> turns_;  // clients that have items
+  std::list<std::shared_ptr<const std::string>> turns_;  // clients that have items
   std::size_t count_ = 0, bytes_ = 0;
 };
 
