@@ -55,14 +55,18 @@ core::Status take_recipe(const std::string& text, RecordOptions& options, VerbCo
   return core::ok_status();
 }
 
-/// Writes the recording `aside`, and labels where they are asked for; kCancelled with what is done in both.
+/// Writes the recording `aside`, and labels where they are asked for; kCancelled with what is done in both, `frames` of
+/// them.
 core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene& scene, const std::string& text,
                          FilesOfScene files, const RecordOptions& options, std::uint64_t seed, Backends& backends,
-                         BopDataset* labels, VerbContext& context) {
+                         BopDataset* labels, std::size_t& frames, VerbContext& context) {
   PRESCENE_TRY(const auto recording,
                RecordingWriter::create(aside, {options.simulate, text, seed, "", std::move(files)}));
   SimulatedRecordingOptions simulation = options.simulation;
-  if (labels != nullptr) simulation.on_frame = [&](const SimulatedFrame& frame) { return labels->add(frame); };
+  simulation.on_frame = [&](const SimulatedFrame& frame) {
+    ++frames;
+    return labels != nullptr ? labels->add(frame) : core::ok_status();
+  };
   core::Status simulated = simulate_recording(scene, simulation, seed, backends, context.cancellation(),
                                               context.progress("recording"), *recording);
   const core::Status labelled = labels != nullptr ? labels->close() : core::ok_status();
@@ -151,14 +155,16 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   const std::filesystem::path target =
       replaces ? std::filesystem::canonical(options.output, error) : std::filesystem::path(options.output);
   PRESCENE_TRY(const std::filesystem::path aside, interfaces::create_beside(target, options.output));
+  std::size_t frames = 0;
   core::Status status =
-      simulate_to(aside, *scene, text, std::move(files), options, seed, backends, labels.get(), context);
+      simulate_to(aside, *scene, text, std::move(files), options, seed, backends, labels.get(), frames, context);
   const bool cancelled = status.code() == core::StatusCode::kCancelled;
-  const bool keeps = status.ok() || (cancelled && !replaces);
+  const bool keeps = status.ok() || (cancelled && !replaces && frames > 0);
   if (keeps) std::filesystem::rename(aside, target, error);
   if (keeps && error) status = core::unavailable(options.output + ": cannot be replaced: " + error.message());
   if (!keeps || error) std::filesystem::remove(aside, error);
   if (cancelled && replaces) return core::cancelled("stopped on request; " + options.output + " is as it was");
+  if (cancelled && !keeps) return core::cancelled("stopped on request before the first frame; nothing was recorded");
   if (keeps && bag) {
     const core::Status written = bag->finish();
     if (status.ok()) status = written;

@@ -5,8 +5,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <iterator>
+#include <string>
+#include <thread>
 
 #include "program.h"
 #include "tests/support/paths.h"
@@ -72,6 +76,22 @@ TEST_F(Outputs, AnOlderRecordingStaysUntilTheNewOneIsWhole) {
   EXPECT_EQ(run_program({"record", "--simulate", path("seen.yaml"), "-o", path("old.mcap")}).exit_code, 0);
   EXPECT_EQ(run_program({"replay", path("old.mcap")}).exit_code, 0);
   EXPECT_EQ(files(), before);
+}
+
+// Whenever it is stopped. So long a scene is mostly still played then, before its first frame.
+TEST_F(Outputs, WhatIsStoppedHoldsAFrameOrLeavesNothing) {
+  std::string scene = std::string(kScene) + kCamera;
+  scene.replace(scene.find("0.2"), 3, "600");
+  write_file(path("long.yaml"), scene);
+  const std::ptrdiff_t before = files();
+  BackgroundProgram recording({"record", "--simulate", path("long.yaml"), "-o", path("stopped.mcap")});
+  while (files() == before && !recording.has_ended()) std::this_thread::yield();
+  EXPECT_EQ(recording.stop(SIGINT), 1);
+  if (std::filesystem::exists(path("stopped.mcap"))) {
+    EXPECT_EQ(run_program({"replay", path("stopped.mcap")}).exit_code, 0);
+  } else {
+    EXPECT_EQ(files(), before) << "something was left";
+  }
 }
 
 TEST_F(Outputs, LabelsLieBesideTheSameRecording) {
