@@ -261,7 +261,7 @@ Result<bool> Db3Reader::Impl::read_message(const Db3Row& at, McapMessage* out) {
   }
   if (at.time_ns < 0) {
     return core::data_loss(path.string() + ": a message on " +
-                           channels[static_cast<std::size_t>(channel->second)].topic + " has the time " +
+                           quote(channels[static_cast<std::size_t>(channel->second)].topic) + " has the time " +
                            std::to_string(at.time_ns) + " ns; times begin with 1970" + kDb3Remedy);
   }
   const auto* data = static_cast<const std::uint8_t*>(sqlite3_column_blob(message.get(), 1));

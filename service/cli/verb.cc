@@ -31,7 +31,8 @@ core::LogSink stderr_log(bool quiet) {
   auto logger = std::make_shared<spdlog::logger>("prescene", std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
   logger->set_pattern("%^%l%$: %v");
   logger->set_level(quiet ? spdlog::level::warn : spdlog::level::info);
-  return [logger](core::LogLevel level, const std::string& text) {
+  return [logger](core::LogLevel level, const std::string& said) {
+    const std::string text = interfaces::printable_lines(said);
     switch (level) {
       case core::LogLevel::kDebug:
         logger->debug("{}", text);
@@ -156,14 +157,13 @@ void VerbContext::end_progress() {
 void VerbContext::print(const nlohmann::ordered_json& document, const std::string& text) {
   end_progress();
   // Bytes that are not UTF-8 (a file name, say) are replaced, not thrown on.
-  const std::string out = options_.json ? belief::json_text(document, 2) + "\n" : text;
-  write_out(out);
+  write_out(options_.json ? belief::json_text(document, 2) + "\n" : interfaces::printable_lines(text));
   printed_ = true;
 }
 
 void VerbContext::print_line(const nlohmann::ordered_json& document, const std::string& text) {
   end_progress();
-  write_out(options_.json ? belief::json_text(document) + "\n" : text);
+  write_out(options_.json ? belief::json_text(document) + "\n" : interfaces::printable_lines(text));
   printed_lines_ = true;
 }
 
@@ -185,7 +185,8 @@ ExitCode VerbContext::finish(const std::string& verb, core::Status status) {
     else
       std::fprintf(stderr, "prescene %s: %s\n", verb.c_str(), text.c_str());
   }
-  if (!status.ok()) std::fprintf(stderr, "prescene %s: %s\n", verb.c_str(), to_string(status).c_str());
+  if (!status.ok())
+    std::fprintf(stderr, "prescene %s: %s\n", verb.c_str(), interfaces::printable_lines(to_string(status)).c_str());
   return exit_code_of(status);
 }
 

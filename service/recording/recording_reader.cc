@@ -248,7 +248,7 @@ core::Result<std::optional<RecordedEntry>> RecordingReader::next() {
     }
     const interfaces::McapChannel& channel = reader_->channels()[static_cast<std::size_t>(message->channel)];
     if (std::max(message->publish_time_ns, message->log_time_ns) > kLatestRecordedNs) {
-      return core::data_loss("the recording has a message on " + channel.topic +
+      return core::data_loss("the recording has a message on " + interfaces::quote(channel.topic) +
                              " from after the year 2116: its times are wrong");
     }
     const std::string kind = kind_of(channel);

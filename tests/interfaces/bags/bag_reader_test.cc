@@ -187,6 +187,12 @@ TEST_F(Bags, TopicsOfADb3ThatAreNotInCdrAreNamedWhereTheyHaveMessages) {
   EXPECT_EQ((*reader)->loss_text(), "3 messages that are not in CDR were left out: '/a' ('json'), '/b' ('ros1')");
 }
 
+TEST_F(Bags, ATopicsNameIsNeverShownAsItIs) {
+  const auto file = path("hostile.db3");
+  tests::write_db3(file, {{"/a\x1b[2J", "x/msg/Y"}}, {{1, -5, {1}}});
+  EXPECT_THAT(failure_of(file).message(), HasSubstr("a message on '/a\\x1b[2J' has the time -5 ns"));
+}
+
 TEST_F(Bags, OddMessagesAreRefusedOrCounted) {
   const auto file = path("odd.db3");
   tests::write_db3(file, {{"/a", "std_msgs/msg/String"}, {"/json", "x/msg/Y", "json"}},
