@@ -2,8 +2,10 @@
 #include "prescene/service/belief_summary.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "prescene/belief/json.h"
 #include "prescene/filter/operators/unknown_objects.h"
@@ -19,6 +21,9 @@ using nlohmann::ordered_json;
 
 // RViz draws each frame anew: enough triangles to know the object by.
 constexpr int kMarkerTriangles = 300;
+
+// Half of what fits, the year 2116, as of recordings (kLatestRecordedNs): differences of stamps do not overflow.
+constexpr core::TimeNs kLatestStampNs = std::numeric_limits<core::TimeNs>::max() / 2;
 
 constexpr belief::TrackState kStates[] = {belief::TrackState::kTracked, belief::TrackState::kDoubtful,
                                           belief::TrackState::kUnseen, belief::TrackState::kLost};
@@ -57,14 +62,22 @@ geometry::Vector3d vector_or_zero(const ordered_json& object, const char* key) {
   return vector;
 }
 
+/// Nothing where it is no whole number from 0 to `most`.
+std::optional<core::TimeNs> whole_number(const ordered_json& json, core::TimeNs most) {
+  if (!json.is_number_integer()) return std::nullopt;
+  if (json.is_number_unsigned() && json.get<std::uint64_t>() > static_cast<std::uint64_t>(most)) return std::nullopt;
+  const auto value = json.get<core::TimeNs>();
+  return value >= 0 && value <= most ? std::optional(value) : std::nullopt;
+}
+
 /// What is not of the form is left out.
 void read_learned(const ordered_json& json, ObjectSummary& object) {
   constexpr std::size_t kMostParameters = 64;
   if (const auto twist = json.find("twist"); twist != json.end() && twist->is_object())
     object.V_WO = {vector_or_zero(*twist, "angular"), vector_or_zero(*twist, "linear")};
   object.lessons = static_cast<int>(std::clamp(number_or(json, "lessons", 0.0), 0.0, 1e9));
-  if (const auto stamp = json.find("learned_ns"); stamp != json.end() && stamp->is_number_integer())
-    object.learned_ns = stamp->get<core::TimeNs>();
+  if (const auto stamp = json.find("learned_ns"); stamp != json.end())
+    object.learned_ns = whole_number(*stamp, kLatestStampNs).value_or(object.learned_ns);
   const auto parameters = json.find("parameters");
   if (parameters == json.end() || !parameters->is_array()) return;
   for (const ordered_json& parameter : *parameters) {
@@ -228,7 +241,15 @@ core::Result<BeliefSummary> belief_summary_of_document(const ordered_json& json)
       !is("objects", &ordered_json::is_array)) {
     return core::invalid_input("belief: not {\"step\", \"stamp_ns\", \"objects\"}");
   }
-  BeliefSummary summary{json["step"].get<std::uint64_t>(), json["stamp_ns"].get<core::TimeNs>(), {}};
+  const auto step = whole_number(json["step"], std::numeric_limits<core::TimeNs>::max());
+  const auto stamp_ns = whole_number(json["stamp_ns"], kLatestStampNs);
+  if (!step)
+    return core::invalid_input("belief: step " + belief::json_text(json["step"]) + " is none: steps count from 0");
+  if (!stamp_ns) {
+    return core::invalid_input("belief: stamp_ns " + belief::json_text(json["stamp_ns"]) +
+                               " is not between the years 1970 and 2116: set the clock of the sender or the camera");
+  }
+  BeliefSummary summary{static_cast<std::uint64_t>(*step), *stamp_ns, {}};
   for (const ordered_json& object : json["objects"]) {
     PRESCENE_TRY(ObjectSummary read, object_from_json(object));
     summary.objects.push_back(std::move(read));

@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <string>
 
 #include "prescene/geometry/primitives.h"
 
@@ -94,6 +97,23 @@ TEST(BeliefSummary, ReadsBackWhatWasWritten) {
   EXPECT_DOUBLE_EQ(read->objects[0].covariance(1, 4), -2.5e-5);
   EXPECT_LT((read->objects[0].X_WO.translation - summary.objects[0].X_WO.translation).norm(), 1e-15);
   EXPECT_LT(geometry::angle_between(read->objects[0].X_WO.rotation, summary.objects[0].X_WO.rotation), 1e-7);
+}
+
+TEST(BeliefSummary, StampsThatNoClockGivesAreRefused) {
+  const auto with = [](const std::string& step, const std::string& stamp_ns) {
+    return belief_summary_from_json("{\"step\": " + step + ", \"stamp_ns\": " + stamp_ns + ", \"objects\": []}");
+  };
+  const auto latest = static_cast<std::uint64_t>(std::numeric_limits<core::TimeNs>::max() / 2);
+  EXPECT_TRUE(with("0", "0").ok());
+  ASSERT_TRUE(with("7", std::to_string(latest)).ok());
+  EXPECT_EQ(with("7", std::to_string(latest))->stamp_ns, static_cast<core::TimeNs>(latest));
+  for (const std::string& stamp : {std::to_string(latest + 1), std::string("-1"), std::string("18446744073709551615"),
+                                   std::string("9223372036854775807"), std::string("-9223372036854775808")}) {
+    const auto read = with("7", stamp);
+    ASSERT_FALSE(read.ok()) << stamp;
+    EXPECT_NE(read.status().message().find("set the clock"), std::string::npos) << read.status().message();
+  }
+  for (const char* step : {"-1", "18446744073709551615"}) EXPECT_FALSE(with(step, "2").ok()) << step;
 }
 
 TEST(BeliefSummary, StrangersTextIsRefused) {

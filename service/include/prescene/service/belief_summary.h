@@ -54,6 +54,8 @@ BeliefSummary summary_of(const belief::Belief& belief);
 /// where the scene has joints "joints": [{"joint", "type", "unit", "position", "standard_deviation", "velocity",
 /// "limits", "confidence"}]}
 nlohmann::ordered_json to_json(const BeliefSummary& summary);
+/// kInvalidInput where it is not of that form, or stamps are not between 1970 and 2116. Of what need not be there, what
+/// is of another form is left out.
 core::Result<BeliefSummary> belief_summary_from_json(const std::string& text);
 core::Result<BeliefSummary> belief_summary_of_document(const nlohmann::ordered_json& json);
 
