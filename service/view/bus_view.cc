@@ -205,7 +205,7 @@ void BusView::Impl::take_belief(const ReceivedMessage& message) {
   const auto text = interfaces::decode_cdr<interfaces::RosString>(message.cdr);
   if (!text) return;
   auto summary = belief_summary_from_json(text->data);
-  if (!summary) return;
+  if (!summary) return view->set_health("a belief was left out: " + summary.status().message());
   heard = true;
   if (!given_scene) make_scene(*summary);
   ShownStep step{belief_of_summary(*summary, observation, scene), observation, 0.0, {}};

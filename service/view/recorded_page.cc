@@ -166,6 +166,9 @@ std::string RecordedPage::data() const {
     remarks.push_back(
         "Of the first " + std::to_string(history_.forgotten_steps()) +
         " steps there are no curves: an object or a parameter was no longer there, or the clock went back.");
+  if (history_.left_out_objects() > 0)
+    remarks.push_back(std::to_string(history_.left_out_objects()) +
+                      " objects have no curves and states: there are too many, or their names are too long.");
   if (answers_left_out_ > 0) remarks.push_back(std::to_string(answers_left_out_) + " long answers are left out.");
   const auto as_is = [](const std::string& text) { return text; };
   const auto kept = [](const ThinnedTexts::Text& one) { return one.text; };

@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -19,9 +20,11 @@ namespace {
 
 double shortened(double value) { return std::isfinite(value) ? std::round(value * 1e5) / 1e5 : 0.0; }
 
-std::vector<std::string> columns_of(const BeliefSummary& summary) {
+constexpr std::size_t kMostColumnText = 256 << 10;  // bytes; a name from the bus may have any length
+
+std::vector<std::string> columns_of(std::span<const ObjectSummary> objects) {
   std::vector<std::string> columns;
-  for (const ObjectSummary& object : summary.objects) {
+  for (const ObjectSummary& object : objects) {
     for (const char* what : {"/state", "/confidence", "/existence"}) columns.push_back(object.name + what);
     for (const belief::ParameterEstimate& parameter : object.parameters)
       for (const char* what : {"", "/deviation"}) columns.push_back(object.name + "/" + parameter.name + what);
@@ -29,9 +32,9 @@ std::vector<std::string> columns_of(const BeliefSummary& summary) {
   return columns;
 }
 
-std::vector<std::string> names_of(const BeliefSummary& summary) {
+std::vector<std::string> names_of(std::span<const ObjectSummary> objects) {
   std::vector<std::string> names;
-  for (const ObjectSummary& object : summary.objects) names.push_back(object.name);
+  for (const ObjectSummary& object : objects) names.push_back(object.name);
   return names;
 }
 
@@ -51,12 +54,31 @@ std::optional<std::vector<std::size_t>> places_among(const std::vector<std::stri
 
 }  // namespace
 
+/// The first of them, as many as there is room for.
+ViewHistory::Objects ViewHistory::that_fit(const std::vector<ObjectSummary>& objects) const {
+  std::size_t count = 0, columns = 0, text = 0;
+  for (const ObjectSummary& object : objects) {
+    const std::size_t own = 3 + 2 * object.parameters.size();
+    columns += own;
+    text += own * object.name.size();
+    for (const belief::ParameterEstimate& parameter : object.parameters) text += 2 * parameter.name.size();
+    if (columns > most_columns_ || text > kMostColumnText) break;
+    ++count;
+  }
+  return Objects(objects).first(count);
+}
+
 bool ViewHistory::add(const BeliefSummary& summary, std::uint64_t index) {
-  std::vector<std::string> columns = columns_of(summary);
-  if (rows_.empty() || summary.stamp_ns < last_ns_ || (columns != columns_ && !make_room_for(summary, columns)))
-    begin_anew(summary, std::move(columns));
+  const Objects objects = that_fit(summary.objects);
+  if (const std::size_t left_out = summary.objects.size() - objects.size(); left_out > left_out_) {
+    left_out_ = left_out;
+    ++revision_;
+  }
+  std::vector<std::string> columns = columns_of(objects);
+  if (rows_.empty() || summary.stamp_ns < last_ns_ || (columns != columns_ && !make_room_for(objects, columns)))
+    begin_anew(summary.stamp_ns, objects, std::move(columns));
   last_ns_ = summary.stamp_ns;
-  add_runs(summary, index);
+  add_runs(summary.stamp_ns, objects, index);
   if (seen_++ % stride_ != 0) return false;
   if (rows_.size() >= most_rows_) {
     std::size_t kept = 0;
@@ -67,7 +89,7 @@ bool ViewHistory::add(const BeliefSummary& summary, std::uint64_t index) {
     if ((seen_ - 1) % stride_ != 0) return false;
   }
   Row row{index, seconds_of(summary.stamp_ns), {}};
-  for (const ObjectSummary& object : summary.objects) {
+  for (const ObjectSummary& object : objects) {
     row.values.insert(row.values.end(),
                       {static_cast<double>(object.state), shortened(object.confidence), shortened(object.existence)});
     for (const belief::ParameterEstimate& parameter : object.parameters)
@@ -77,15 +99,15 @@ bool ViewHistory::add(const BeliefSummary& summary, std::uint64_t index) {
   return true;
 }
 
-void ViewHistory::begin_anew(const BeliefSummary& summary, std::vector<std::string>&& columns) {
+void ViewHistory::begin_anew(core::TimeNs stamp_ns, Objects objects, std::vector<std::string>&& columns) {
   forgotten_ += seen_;
   columns_ = std::move(columns);
   rows_.clear();
   stride_ = 1;
   seen_ = 0;
-  first_ns_ = summary.stamp_ns;
+  first_ns_ = stamp_ns;
   ++revision_;
-  objects_ = names_of(summary);
+  objects_ = names_of(objects);
   runs_.clear();
   current_.assign(objects_.size(), std::nullopt);
   shortest_run_ = 0.0;
@@ -93,9 +115,9 @@ void ViewHistory::begin_anew(const BeliefSummary& summary, std::vector<std::stri
 }
 
 /// What was before stays, in the new columns and under the new numbers of the objects; false where one of them went.
-bool ViewHistory::make_room_for(const BeliefSummary& summary, const std::vector<std::string>& columns) {
-  const std::vector<std::string> objects = names_of(summary);
-  const auto new_columns = places_among(columns_, columns), new_objects = places_among(objects_, objects);
+bool ViewHistory::make_room_for(Objects objects, const std::vector<std::string>& columns) {
+  std::vector<std::string> names = names_of(objects);
+  const auto new_columns = places_among(columns_, columns), new_objects = places_among(objects_, names);
   if (!new_columns || !new_objects) return false;
   for (Row& row : rows_) {
     std::vector<double> values(columns.size(), std::numeric_limits<double>::quiet_NaN());
@@ -107,19 +129,19 @@ bool ViewHistory::make_room_for(const BeliefSummary& summary, const std::vector<
   for (std::size_t i = 0; i < current_.size(); ++i) current[(*new_objects)[i]] = std::move(current_[i]);
   current_ = std::move(current);
   columns_ = columns;
-  objects_ = objects;
+  objects_ = std::move(names);
   ++revision_;
   return true;
 }
 
-void ViewHistory::add_runs(const BeliefSummary& summary, std::uint64_t index) {
-  for (std::size_t i = 0; i < summary.objects.size(); ++i) {
-    const ObjectSummary& object = summary.objects[i];
+void ViewHistory::add_runs(core::TimeNs stamp_ns, Objects objects, std::uint64_t index) {
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const ObjectSummary& object = objects[i];
     const std::string held_by = object.held_by.value_or("");
     const std::pair now(object.state, held_by);
     if (current_[i] == now) continue;
     current_[i] = now;
-    runs_.push_back({i, index, seconds_of(summary.stamp_ns), object.state, held_by});
+    runs_.push_back({i, index, seconds_of(stamp_ns), object.state, held_by});
   }
   if (runs_.size() > std::max(most_runs_, 2 * objects_.size())) join_short_runs();
 }
@@ -185,6 +207,7 @@ nlohmann::ordered_json to_json(const ViewHistory& history) {
       .number("shortest_run", history.shortest_run())
       .count("joined_runs", history.joined_runs())
       .count("forgotten_steps", history.forgotten_steps())
+      .count("left_out_objects", history.left_out_objects())
       .take();
 }
 

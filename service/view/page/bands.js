@@ -36,8 +36,8 @@ export class Bands {
         : run ? this.objects[run.object] + ': ' + run.state + (run.heldBy ? ', held by ' + run.heldBy : '') + ' from ' + run.time.toFixed(2) + ' s' : '';
     });
   }
-  set({ objects = [], runs = [], shortest_run: shortest = 0, joined_runs: joined = 0, forgotten_steps: forgotten = 0 }) {
-    Object.assign(this, { objects, runs: [], events: [], shortest, joined, forgotten });
+  set({ objects = [], runs = [], shortest_run: shortest = 0, joined_runs: joined = 0, forgotten_steps: forgotten = 0, left_out_objects: leftOut = 0 }) {
+    Object.assign(this, { objects, runs: [], events: [], shortest, joined, forgotten, leftOut });
     this.list.replaceChildren();
     this.newest = new Map();
     this.add(runs);
@@ -55,12 +55,13 @@ export class Bands {
   // The newest, if there are many: the bands have all.
   listEvents() {
     const shown = this.events.slice(-mostListed), left = this.events.length - shown.length;
-    this.details.hidden = !this.events.length && !this.forgotten;
+    this.details.hidden = !this.events.length && !this.forgotten && !this.leftOut;
     this.details.firstElementChild.textContent = this.events.length === 1 ? '1 change of a state' : this.events.length + ' changes of states';
     for (const note of this.details.querySelectorAll('.note')) note.remove();
     const note = (text) => this.details.insertBefore(make('p', { className: 'note', textContent: text }), this.list);
     if (left) note('The last ' + shown.length + ' of them');
     if (this.forgotten) note('Of the first ' + this.forgotten + ' steps there are no curves and states: something was no longer there, or the clock went back');
+    if (this.leftOut) note(this.leftOut + ' objects have no curves and states: there are too many, or their names are too long');
     if (this.joined) note(this.joined + ' states that lasted less than ' + this.shortest.toFixed(1) + ' s are left out');
     this.list.replaceChildren(...shown.map((event) => {
       const button = make('button', { textContent: event.time.toFixed(2) + ' s, ' + event.text });

@@ -141,6 +141,37 @@ TEST(ViewHistory, ANewObjectLeavesTheEarlierCurves) {
   EXPECT_EQ(history.forgotten_steps(), 4U);
 }
 
+// However many there are and however long their names: whole objects are taken in, the first ones, and the others
+// count.
+TEST(ViewHistory, OfTooManyObjectsTheFirstAreTakenIn) {
+  const auto with_objects = [](std::uint64_t step, std::size_t count, std::size_t name_bytes) {
+    BeliefSummary summary = summary_at(step);
+    summary.objects.resize(count, ObjectSummary(summary.objects[0]));
+    for (std::size_t i = 0; i < count; ++i) summary.objects[i].name = std::to_string(i) + std::string(name_bytes, 'x');
+    return summary;
+  };
+  ViewHistory one;
+  one.add(with_objects(0, 1, 0), 0);
+  const std::size_t own = one.columns().size();
+  ASSERT_GT(own, 0U);
+  ViewHistory history(100, 100, 4 * own + own - 1);
+  for (std::uint64_t i = 0; i < 10; ++i) history.add(with_objects(i, i == 5 ? 70 : 30, 0), i);
+  EXPECT_EQ(history.objects(), (std::vector<std::string>{"0", "1", "2", "3"}));
+  EXPECT_EQ(history.columns().size(), 4 * own);
+  EXPECT_EQ(history.rows().size(), 10U);
+  for (const ViewHistory::Row& row : history.rows()) EXPECT_EQ(row.values.size(), 4 * own);
+  EXPECT_EQ(history.left_out_objects(), 66U);
+  EXPECT_EQ(history.forgotten_steps(), 0U);
+  EXPECT_EQ(to_json(history)["left_out_objects"], 66);
+  ViewHistory few;
+  few.add(with_objects(0, 30, 0), 0);
+  EXPECT_EQ(few.left_out_objects(), 0U);
+  ViewHistory of_long_names;
+  of_long_names.add(with_objects(0, 3, std::size_t{10} << 20), 0);
+  EXPECT_TRUE(of_long_names.columns().empty());
+  EXPECT_EQ(of_long_names.left_out_objects(), 3U);
+}
+
 BeliefSummary state_at(std::uint64_t step, belief::TrackState state, const std::string& held_by = "") {
   static const BeliefSummary kFirst = summary_at(0);
   BeliefSummary summary = kFirst;

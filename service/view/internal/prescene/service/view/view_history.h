@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,8 +19,9 @@ namespace prescene::service {
 /// Not thread-safe.
 class ViewHistory {
  public:
-  explicit ViewHistory(std::size_t most_rows = 4000, std::size_t most_runs = 4000)
-      : most_rows_(most_rows), most_runs_(most_runs) {}
+  /// `most_columns`: 32 MB of rows by default; some 50 objects with what is learned of them.
+  explicit ViewHistory(std::size_t most_rows = 4000, std::size_t most_runs = 4000, std::size_t most_columns = 1024)
+      : most_rows_(most_rows), most_runs_(most_runs), most_columns_(most_columns) {}
 
   struct Row {
     std::uint64_t index = 0;
@@ -36,7 +38,8 @@ class ViewHistory {
   };
   /// Takes a step in; false where it was left out, as its neighbours stand for it. Objects and parameters may join
   /// (columns() changes). Where one is missing that was there before, or after a stamp before the last, it begins anew;
-  /// forgotten_steps() counts those before.
+  /// forgotten_steps() counts those before. Of the objects, the first whose columns fit are taken in;
+  /// left_out_objects() counts the others.
   bool add(const BeliefSummary& summary, std::uint64_t index);
 
   /// Of each object "NAME/state" (0 tracked, 1 doubtful, 2 unseen, 3 lost), "NAME/confidence", "NAME/existence", and of
@@ -50,17 +53,21 @@ class ViewHistory {
   double shortest_run() const { return shortest_run_; }  ///< s; 0 = none was joined.
   std::uint64_t joined_runs() const { return joined_; }
   std::uint64_t forgotten_steps() const { return forgotten_; }
+  /// Of the step that had most too many.
+  std::size_t left_out_objects() const { return left_out_; }
   /// Changes whenever rows, runs or columns are others than before: who kept a copy needs a new one.
   std::uint64_t revision() const { return revision_; }
   double seconds_of(core::TimeNs stamp_ns) const { return 1e-9 * static_cast<double>(stamp_ns - first_ns_); }
 
  private:
-  void begin_anew(const BeliefSummary& summary, std::vector<std::string>&& columns);
-  bool make_room_for(const BeliefSummary& summary, const std::vector<std::string>& columns);
-  void add_runs(const BeliefSummary& summary, std::uint64_t index);
+  using Objects = std::span<const ObjectSummary>;
+  Objects that_fit(const std::vector<ObjectSummary>& objects) const;
+  void begin_anew(core::TimeNs stamp_ns, Objects objects, std::vector<std::string>&& columns);
+  bool make_room_for(Objects objects, const std::vector<std::string>& columns);
+  void add_runs(core::TimeNs stamp_ns, Objects objects, std::uint64_t index);
   void join_short_runs();
 
-  std::size_t most_rows_, most_runs_;
+  std::size_t most_rows_, most_runs_, most_columns_, left_out_ = 0;
   std::vector<std::string> columns_, objects_;
   std::vector<Row> rows_;
   std::vector<Run> runs_;
@@ -76,7 +83,7 @@ nlohmann::ordered_json to_json(const ViewHistory::Row& row);
 /// [object's place, index, time, state, held_by], with null for a free one
 nlohmann::ordered_json to_json(const ViewHistory::Run& run);
 /// {"op": "history", "columns", "rows", "objects", "runs", "shortest_run", "joined_runs",
-/// "forgotten_steps"}
+/// "forgotten_steps", "left_out_objects"}
 nlohmann::ordered_json to_json(const ViewHistory& history);
 
 }  // namespace prescene::service
