@@ -13,6 +13,7 @@
 #include "prescene/core/thread_priority.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/outside_json.h"
+#include "query_replies.h"
 
 namespace prescene::service {
 namespace {
@@ -22,12 +23,6 @@ constexpr std::size_t kLongestQuestion = 1u << 20;
 // Where there is no room, the id is looked for in questions up to this length only: in longer ones it takes too long.
 constexpr std::size_t kLongestWithId = 4096;
 constexpr std::size_t kMostRefusalsWaiting = 256;
-// s between the last simulated instance and the end of all work on a question, at most.
-constexpr double kRestSeconds = 1.5;
-constexpr double kProgressInterval = 0.2;  // s, at least, between two messages on how far the work is
-// s, at least, between two answers so far: what a reader with a history of ten answers can take from several questions.
-constexpr double kSoFarInterval = 0.05;
-
 /// Questions without limits of their own are bounded in time, so that a robot gets its answer.
 void bound_effort(belief::Query& query, double default_seconds, double most_seconds) {
   const auto bound = [=](belief::Effort& effort) {
@@ -37,11 +32,6 @@ void bound_effort(belief::Query& query, double default_seconds, double most_seco
   if (auto* predict = std::get_if<belief::PredictQuery>(&query.what)) bound(predict->effort);
   if (auto* stability = std::get_if<belief::StabilityQuery>(&query.what)) bound(stability->effort);
   if (auto* achieve = std::get_if<belief::AchieveQuery>(&query.what)) bound(achieve->effort);
-}
-
-template <class Question>
-const std::string& id_in(const Question& question) {
-  return std::visit([](const auto& one) -> const std::string& { return one.id; }, question);
 }
 
 /// Nothing where the text is no request to cancel.
@@ -75,29 +65,12 @@ core::Status no_room(FairBound bound, const FairLimits& limits) {
 
 }  // namespace
 
-std::string error_answer(const std::string& id, const core::Status& error) {
-  nlohmann::ordered_json answer = nlohmann::ordered_json::object();
-  if (!id.empty()) answer["id"] = id;
-  answer.update(belief::error_to_json(error));
-  return belief::json_text(answer);
-}
-
-void add_learned_seconds(core::TimeNs first_frame_ns, nlohmann::ordered_json& objects) {
-  for (nlohmann::ordered_json& object : objects) {
-    const core::TimeNs learned_ns = object.value("learned_ns", core::TimeNs{0});
-    object["learned_s"] = object.value("lessons", 0) > 0
-                              ? nlohmann::ordered_json(core::seconds_of(learned_ns - first_frame_ns))
-                              : nlohmann::ordered_json();
-  }
-}
-
 QueryWorker::QueryWorker(Backends& backends, int threads, const QueryWorkerSettings& settings,
                          std::function<std::shared_ptr<const belief::Belief>()> snapshot, AnswerSink on_answer)
-    : backends_(backends),
-      settings_(settings),
+    : settings_(settings),
       default_seconds_(settings.default_seconds),
       most_seconds_(settings.most_seconds),
-      snapshot_(std::move(snapshot)),
+      replies_(std::make_unique<QueryReplies>(backends, settings_, std::move(snapshot))),
       on_answer_(std::move(on_answer)),
       unread_(settings.unread),
       waiting_(settings.waiting) {
@@ -217,22 +190,22 @@ void QueryWorker::read(const std::string& question_json, const std::string& clie
       if (!*request) return refuse(id_of(question_json), request->status());
       return cancel(**request);
     }
-    std::shared_ptr<const Question> question;
+    std::shared_ptr<const AnyQuestion> question;
     if (belief::asks_to_explain(question_json)) {
       auto read = belief::explain_question_from_json(question_json);
       if (!read) return refuse(id_of(question_json), read.status());
-      question = std::make_shared<const Question>(*std::move(read));
+      question = std::make_shared<const AnyQuestion>(*std::move(read));
     } else if (belief::asks_why(question_json)) {
       auto read = belief::why_question_from_json(question_json);
       if (!read) return refuse(id_of(question_json), read.status());
-      question = std::make_shared<const Question>(*std::move(read));
+      question = std::make_shared<const AnyQuestion>(*std::move(read));
     } else {
       auto read = belief::query_from_json(question_json);
       if (!read) return refuse(id_of(question_json), read.status());
       const bool at_once = std::holds_alternative<belief::WhereQuery>(read->what) ||
                            std::holds_alternative<belief::TimelineQuery>(read->what);
       if (!at_once) bound_effort(*read, default_seconds_, most_seconds_);
-      question = std::make_shared<const Question>(*std::move(read));
+      question = std::make_shared<const AnyQuestion>(*std::move(read));
       if (at_once) return answer(*question, stop_, *pools_.front());
     }
     id = id_in(*question);
@@ -314,7 +287,7 @@ void QueryWorker::simulate_questions(std::size_t thread) {
   }
 }
 
-void QueryWorker::answer(const Question& question, const core::Cancellation& cancelled, core::ThreadPool& pool) {
+void QueryWorker::answer(const AnyQuestion& question, const core::Cancellation& cancelled, core::ThreadPool& pool) {
   const std::string& id = id_in(question);
   const auto finish = [&] {
     // Before the answer goes out: whoever has it may ask under the same id again.
@@ -324,7 +297,9 @@ void QueryWorker::answer(const Question& question, const core::Cancellation& can
     simulate_changed_.notify_all();  // the next question of the same client may begin
   };
   try {
-    const Reply reply = reply_to(question, cancelled, pool);
+    const bool is_simulated = &cancelled != &stop_;
+    const QueryReplies::Reply reply =
+        replies_->reply_to(question, {most_seconds_, session_begin_ns_, is_simulated}, cancelled, pool);
     finish();
     if (reply.text.size() > interfaces::CdrLimits().max_string_bytes)
       return refuse(id, core::resource_exhausted("the answer has " + std::to_string(reply.text.size() >> 20) +
@@ -334,85 +309,6 @@ void QueryWorker::answer(const Question& question, const core::Cancellation& can
     finish();
     refuse_after_exception(id, "the question could not be answered");
   }
-}
-
-core::ProgressSink QueryWorker::progress_of(const std::string& id) const {
-  if (!settings_.on_progress || id.empty()) return {};
-  return [this, id, told = std::optional<core::Stopwatch>()](const core::Progress& at) mutable {
-    if (told && told->seconds() < kProgressInterval) return;
-    told.emplace();
-    nlohmann::ordered_json json{{"id", id}, {"fraction", at.fraction}, {"text", at.text}, {"seconds_left", nullptr}};
-    if (at.seconds_left) json["seconds_left"] = *at.seconds_left;
-    try {
-      settings_.on_progress(belief::json_text(json));
-    } catch (const std::exception&) {  // no reason to end the work
-    }
-  };
-}
-
-std::function<void(const belief::Answer&)> QueryWorker::so_far_of(const belief::Query& query) const {
-  if (!settings_.on_answer_so_far || !query.stream || query.id.empty()) return {};
-  return [this, told = std::optional<core::Stopwatch>()](const belief::Answer& so_far) mutable {
-    if (told && told->seconds() < kSoFarInterval) return;
-    try {
-      settings_.on_answer_so_far(belief::json_text(belief::to_json(so_far)));
-    } catch (const std::exception&) {  // no reason to end the work
-    }
-    told.emplace();
-  };
-}
-
-template <class FrameQuestion, class AnswerIt>
-QueryWorker::Reply QueryWorker::reply_from_frames(const FrameQuestion& question, const AnswerIt& answer_it,
-                                                  queries::QueryContext context, const core::Cancellation& cancelled) {
-  if (!answer_it)
-    return {error_answer(question.id, core::unavailable("frames are not kept here, so that nothing can be explained")),
-            false};
-  if (question.max_seconds)
-    context.simulate_until = std::min(*context.simulate_until, queries::deadline_after(*question.max_seconds));
-  auto document = answer_it(question, context);
-  if (document && question.stream) (*document)["final"] = true;
-  if (document) return {belief::json_text(*document), true};
-  // Its time was over in the middle of a search, unless somebody stopped it.
-  const bool too_late = document.status().code() == core::StatusCode::kCancelled && !cancelled.requested();
-  return {error_answer(question.id,
-                       too_late ? core::unavailable("the time ran out: give an object, a shorter window or fewer "
-                                                    "points, or let questions take longer (--most-question-seconds)")
-                                : document.status()),
-          false};
-}
-
-QueryWorker::Reply QueryWorker::reply_to(const Question& question, const core::Cancellation& cancelled,
-                                         core::ThreadPool& pool) {
-  queries::QueryContext context = backends_.query_context(pool);
-  const double most_seconds = most_seconds_;
-  const core::Cancellation end(cancelled, queries::deadline_after(most_seconds + kRestSeconds));
-  context.cancellation = context.abandoned = &end;
-  context.simulate_until = queries::deadline_after(most_seconds);
-  context.most_bytes = settings_.most_bytes;
-  context.timeline = settings_.timeline;
-  if (&cancelled != &stop_) context.progress = progress_of(id_in(question));  // `where` is answered at once
-  if (context.progress) context.progress({0.0, std::nullopt, "begun"});
-  if (const auto* to_explain = std::get_if<belief::ExplainQuestion>(&question))
-    return reply_from_frames(*to_explain, settings_.explain, context, cancelled);
-  if (const auto* why = std::get_if<belief::WhyQuestion>(&question))
-    return reply_from_frames(*why, settings_.why, context, cancelled);
-  const auto& query = std::get<belief::Query>(question);
-  context.on_answer_so_far = so_far_of(query);
-  return reply_to(query, context);
-}
-
-QueryWorker::Reply QueryWorker::reply_to(const belief::Query& query, const queries::QueryContext& context) {
-  const std::shared_ptr<const belief::Belief> belief = snapshot_();
-  // Before the first frame the scene file is all that is known, and says more than the particles drawn from it.
-  const belief::Answer answer = belief->step == 0 ? queries::answer(belief->scene, belief->seed, query, context)
-                                                  : queries::answer(*belief, query, context);
-  nlohmann::ordered_json document = belief::to_json(answer);
-  // Before the first frame nothing was learned in this session.
-  if (const core::TimeNs begin_ns = session_begin_ns_;
-      begin_ns != 0 && std::holds_alternative<belief::WhereAnswer>(answer.what))
-    add_learned_seconds(begin_ns, document["where"]["items"]);
-  return {belief::json_text(document), answer.what.index() > 0};
 }
 
 void QueryWorker::refuse(const std::string& id, const core::Status& reason) {

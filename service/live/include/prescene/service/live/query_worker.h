@@ -95,6 +95,11 @@ inline constexpr const char* kQuestionsWait = "questions wait already";
 /// The answer's text as JSON. Called on the worker's threads, on several at once.
 using AnswerSink = std::function<void(const std::string& answer)>;
 
+/// What is worked on for some time, or answered at once.
+using AnyQuestion = std::variant<belief::Query, belief::ExplainQuestion, belief::WhyQuestion>;
+
+class QueryReplies;
+
 class QueryWorker {
  public:
   /// `threads` for simulating; `snapshot` gives the belief to ask, from any thread. All must outlive the worker.
@@ -131,10 +136,9 @@ class QueryWorker {
   void begin_session(core::TimeNs first_frame_ns) { session_begin_ns_ = first_frame_ns; }
 
  private:
-  using Question = std::variant<belief::Query, belief::ExplainQuestion, belief::WhyQuestion>;
   /// A question to simulate, and what ends the work on it.
   struct Work {
-    std::shared_ptr<const Question> question;  ///< Null: none.
+    std::shared_ptr<const AnyQuestion> question;  ///< Null: none.
     std::shared_ptr<core::Cancellation> end;
   };
   /// What one of the threads that simulate works on, and for whom.
@@ -158,12 +162,8 @@ class QueryWorker {
   const Work* find_work(const std::string& id) const;
   /// With mutex_ held: what comes next to be simulated.
   std::optional<FairQueue<Work>::Entry> take_next();
-  struct Reply {
-    std::string text;
-    bool is_answer = false;  ///< Else the reason why there is none.
-  };
   /// Answers and counts; no exception leaves it, nor the four below.
-  void answer(const Question& question, const core::Cancellation& cancelled, core::ThreadPool& pool);
+  void answer(const AnyQuestion& question, const core::Cancellation& cancelled, core::ThreadPool& pool);
   void refuse(const std::string& id, const core::Status& reason);
   /// In a handler, of an exception while `doing`.
   void refuse_after_exception(const std::string& id, const char* doing);
@@ -171,25 +171,15 @@ class QueryWorker {
   void send(const std::string& answer, std::uint64_t QueryCounts::*fate);
   /// In a handler: the question got no answer, because of the exception.
   void drop();
-  Reply reply_to(const Question& question, const core::Cancellation& cancelled, core::ThreadPool& pool);
-  /// Of the question with that id; empty where nobody is told.
-  core::ProgressSink progress_of(const std::string& id) const;
-  std::function<void(const belief::Answer&)> so_far_of(const belief::Query& query) const;
-  Reply reply_to(const belief::Query& query, const queries::QueryContext& context);
-  /// Of what is asked about frames; `answer_it`: QueryWorkerSettings' for this kind.
-  template <class FrameQuestion, class AnswerIt>
-  Reply reply_from_frames(const FrameQuestion& question, const AnswerIt& answer_it, queries::QueryContext context,
-                          const core::Cancellation& cancelled);
   /// In a handler, of an exception while `doing`: counts it as a failure unless the memory ended, and says what to
   /// refuse the question with.
   core::Status note_exception(const char* doing);
   void take(std::string question_json, const std::string& client);
 
-  Backends& backends_;
   std::vector<std::unique_ptr<core::ThreadPool>> pools_;  // one for each thread that simulates
   QueryWorkerSettings settings_;                          // but for its seconds
   std::atomic<double> default_seconds_, most_seconds_;
-  std::function<std::shared_ptr<const belief::Belief>()> snapshot_;
+  std::unique_ptr<const QueryReplies> replies_;
   AnswerSink on_answer_;
   core::Cancellation stop_;
   std::atomic<core::TimeNs> session_begin_ns_{0};
