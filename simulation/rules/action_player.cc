@@ -110,8 +110,13 @@ Pose ActionPlayer::object_pose(int object, double time) const {
 
 Pose ActionPlayer::planned_pose(int object, double time) const {
   const Hold& hold = objects_[static_cast<std::size_t>(object)];
-  if (hold.control == Control::kCarried || hold.control == Control::kPoured) return carried_pose(hold, time);
+  if (goes_its_way(object)) return carried_pose(hold, time);
   return hold.hand >= 0 ? robot_pose(hold.hand, time) * hold.X_GO : hold.X_GO;
+}
+
+bool ActionPlayer::goes_its_way(int object) const {
+  const Hold& hold = objects_[static_cast<std::size_t>(object)];
+  return is_carried(hold) && (hold.hand < 0 || hands_[static_cast<std::size_t>(hold.hand)].carries == object);
 }
 
 bool ActionPlayer::pusher_present(int pusher, double time) const {
@@ -139,7 +144,7 @@ double ActionPlayer::finish_time() const {
 double ActionPlayer::next_due() const {
   double next = std::numeric_limits<double>::infinity();
   for (const Hold& hold : objects_) {
-    if (hold.control != Control::kCarried && hold.control != Control::kPoured) continue;
+    if (!is_carried(hold)) continue;
     next = std::min(next, hold.begin + belief::duration_of(actions_[static_cast<std::size_t>(hold.action)]));
   }
   for (std::size_t i = 0; i < actions_.size(); ++i) {
@@ -150,11 +155,8 @@ double ActionPlayer::next_due() const {
 
 bool ActionPlayer::over(double time) const {
   const auto done = [](const Step& step) { return step.done; };
-  const auto moved = [](const Hold& hold) {
-    return hold.control == Control::kCarried || hold.control == Control::kPoured;
-  };
   return finished(time) && std::all_of(steps_.begin(), steps_.end(), done) &&
-         std::none_of(objects_.begin(), objects_.end(), moved) &&
+         std::none_of(objects_.begin(), objects_.end(), is_carried) &&
          !slides();  // what sticks in a grip stays so while the hand rests
 }
 
@@ -163,9 +165,9 @@ void ActionPlayer::advance(double time, double dt, const std::vector<Pose>& pose
   const double due = time + 0.5 * dt;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const Hold& hold = objects_[i];
-    if (hold.control != Control::kCarried && hold.control != Control::kPoured) continue;
+    if (!is_carried(hold)) continue;
     if (hold.begin + belief::duration_of(actions_[static_cast<std::size_t>(hold.action)]) > due) continue;
-    finish_carry(static_cast<int>(i), released);
+    finish_carry(static_cast<int>(i), time, dt, poses[i], released);
   }
   for (std::size_t i = 0; i < actions_.size(); ++i) {
     if (!steps_[i].done && begin_of(i) <= due) {
@@ -175,20 +177,25 @@ void ActionPlayer::advance(double time, double dt, const std::vector<Pose>& pose
   }
 }
 
-void ActionPlayer::finish_carry(int object, std::vector<Released>& released) {
+void ActionPlayer::finish_carry(int object, double time, double dt, const Pose& X_now,
+                                std::vector<Released>& released) {
   Hold& hold = objects_[static_cast<std::size_t>(object)];
   const auto index = static_cast<std::size_t>(hold.action);
-  const double end = hold.begin + belief::duration_of(actions_[index]);
-  const Pose X_WO = carrying_pose(hold, end);
-  if (hold.hand >= 0) {
-    stop(hold.hand, X_WO * hold.X_GO.inverse());
+  Twist V_WO;
+  if (!goes_its_way(object)) {
+    V_WO = leaving(object, time, dt, X_now);  // its hand carries something else, or stays where that ended
   } else {
-    hold.X_GO = X_WO;
+    const Pose X_WO = carrying_pose(hold, hold.begin + belief::duration_of(actions_[index]));
+    if (hold.hand >= 0) {
+      stop(hold.hand, X_WO * hold.X_GO.inverse());
+    } else {
+      hold.X_GO = X_WO;
+    }
   }
   hold.action = -1;
   if (belief::lets_go(actions_[index])) {
     // What slides or is inserted is free already.
-    if (!hold.loose) released.push_back({object, Twist{}});
+    if (!hold.loose) released.push_back({object, V_WO});
     hold = Hold{};
   } else {
     hold.control = Control::kHeld;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every stepper does alike with tilts, blows, and grips that may slip: laws in closed form. Tests of a stepper
-// include this and instantiate StepperContract.
+// What every stepper does alike with tilts, hands that hold two things, blows, and grips that may slip: laws in closed
+// form. Tests of a stepper include this and instantiate StepperContract.
 #pragma once
 
 #include <cmath>
@@ -23,6 +23,47 @@ TEST_P(StepperContract, ATiltTurnsTheHeldObjectAboutItsPivot) {
   // The lower edge stays, and what was above it is beside it.
   EXPECT_LT((end.X_WO * tilt.pivot_O - Vector3d(0.05, 0.0, 0.45)).norm(), fine(1e-9));
   EXPECT_LT((end.X_WO.translation - Vector3d(0.10, 0.0, 0.50)).norm(), fine(1e-9));
+}
+
+/// The hand of held_scene(), at rest, with a second object 0.3 m beside the first.
+inline Scene two_held_scene() {
+  Scene scene = held_scene();
+  scene.robot[0].timeline.resize(1);
+  belief::SceneObject other = scene.objects[0];
+  other.name = "other";
+  other.pose = belief::FixedPose{Pose::from_translation({0.0, 0.3, 0.5})};
+  scene.objects.push_back(other);
+  return scene;
+}
+
+// What a hand holds, it keeps as it holds it, though it is sent elsewhere with one thing while it carries the other.
+TEST_P(StepperContract, AHandThatIsSentElsewhereTakesAllThatItHoldsThere) {
+  const Vector3d between(0.0, 0.3, 0.0), goal(0.1, 0.6, 0.7);
+  belief::Transport first{"object", belief::FixedPose{Pose::from_translation({0.2, 0.0, 0.5})}, 0.5};
+  belief::Transport second{"other", belief::FixedPose{Pose::from_translation(goal)}, 0.5};
+  for (const double longer : {0.0, 1.0}) {  // the first would end before the second, or after it
+    first.duration = 0.5 + longer;
+    const belief::Trajectory run = run_actions(two_held_scene(), {{0.25, first}, {0.5, second}}, 2.5, 0.05);
+    for (const WorldState& state : run.states) {
+      const Vector3d apart = state.objects[1].X_WO.translation - state.objects[0].X_WO.translation;
+      EXPECT_LT((apart - between).norm(), fine(1e-9)) << longer << ' ' << state.time;
+      EXPECT_EQ(state.objects[0].mode, MotionMode::kHeld);
+    }
+    EXPECT_LT((run.final().objects[1].X_WO.translation - goal).norm(), fine(1e-9)) << longer;
+  }
+}
+
+// A thing that is put down on the way leaves the hand with its velocity, and the hand goes on.
+TEST_P(StepperContract, AHandThatIsSentElsewhereLetsGoOfWhatItPutsDownAndGoesOn) {
+  const belief::Place put{"object", belief::FixedPose{Pose::from_translation({0.2, 0.0, 0.5})}, 0.5};
+  const belief::Transport second{"other", belief::FixedPose{Pose::from_translation({0.1, 0.6, 0.9})}, 0.5};
+  const belief::Trajectory run = run_actions(two_held_scene(), {{0.25, put}, {0.5, second}}, 1.0);
+  const std::vector<belief::ObjectState>& end = run.final().objects;
+  EXPECT_EQ(end[0].mode, MotionMode::kMoving);
+  const Vector3d fallen(0.0, 0.0, -0.5 * kG * 0.25 * 0.25);  // since 0.75 s
+  EXPECT_LT((end[0].X_WO.translation - (end[1].X_WO.translation - Vector3d(0.0, 0.3, 0.0) + fallen)).norm(),
+            fine(1e-6));
+  EXPECT_LT((end[1].X_WO.translation - Vector3d(0.1, 0.6, 0.9)).norm(), fine(1e-9));
 }
 
 TEST_P(StepperContract, ABumpGivesItsMomentumAndTheMomentOfIt) {

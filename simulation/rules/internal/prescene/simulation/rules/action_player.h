@@ -129,7 +129,12 @@ class ActionPlayer {
                std::vector<Released>& released);
   /// The hand carries nothing any more, and stays there.
   void stop(int robot, const Pose& X_WG);
-  void finish_carry(int object, std::vector<Released>& released);
+  void finish_carry(int object, double time, double dt, const Pose& X_now, std::vector<Released>& released);
+  static bool is_carried(const Hold& hold) {
+    return hold.control == Control::kCarried || hold.control == Control::kPoured;
+  }
+  /// What is under way with it moves it. Else its hand moves something else by now, and it goes along with the hand.
+  bool goes_its_way(int object) const;
   Pose carried_pose(const Hold& hold, double time) const;
   /// Where the hand that carries it has it.
   Pose carrying_pose(const Hold& hold, double time) const;
