@@ -28,11 +28,12 @@ constexpr double kTimeRounding = 1e-9;  // s; times that differ by less are the 
 /// What the hands and what they hold do by plan, action by action.
 class Plan {
  public:
-  explicit Plan(const Scene& scene) : scene_(scene), bodies_(scene.robot.size()), objects_(scene.objects.size()) {
+  explicit Plan(const Scene& scene, const MotionStart& start = {})
+      : scene_(scene), start_(start), bodies_(scene.robot.size()), objects_(scene.objects.size()) {
     for (std::size_t i = 0; i < objects_.size(); ++i) {
       const SceneObject& object = scene.objects[i];
       objects_[i].hand = object.held_by ? find_robot_body(scene, *object.held_by) : std::nullopt;
-      if (objects_[i].hand) objects_[i].X_GO = timeline_pose(*objects_[i].hand, 0.0).inverse() * mean(object.pose);
+      if (objects_[i].hand) objects_[i].X_GO = timeline_pose(*objects_[i].hand, start_time()).inverse() * start_pose(i);
     }
   }
 
@@ -43,8 +44,24 @@ class Plan {
     return X_WG;
   }
 
+  /// Where its hand has it, or where it is since a hand let go of it, or from the start.
+  Pose object_pose(int index, double time) const {
+    const Object& object = objects_[static_cast<std::size_t>(index)];
+    if (object.hand) return pose_of(*object.hand, std::min(time, object.until)) * object.X_GO;
+    return object.X_WO ? *object.X_WO : start_pose(static_cast<std::size_t>(index));
+  }
+
+  /// What begins by `time`.
+  void begin(std::span<const Action> actions, double time) {
+    for (const Action& action : actions) {
+      if (start_time() + action.time > time) break;
+      begin(action);
+    }
+  }
+
+ private:
   void begin(const Action& action) {
-    const double from = action.time;
+    const double from = start_time() + action.time;
     for (std::size_t i = 0; i < objects_.size(); ++i)
       if (objects_[i].until <= from + kTimeRounding) let_go(i, objects_[i].until);
     const std::optional<int> found = find_object(scene_, object_of(action));
@@ -56,8 +73,9 @@ class Plan {
       if (!hand) return;
       let_go(index, from);
       object.hand = hand;
-      if (!object.X_WO) object.X_WO = mean(scene_.objects[index].pose);
-      object.X_GO = pose_of(*hand, from).inverse() * *object.X_WO;
+      if (!object.X_WO) object.X_WO = start_pose(index);
+      const auto X_WG = [&](double time) { return pose_of(*hand, time); };
+      object.X_GO = start_.grasped ? start_.grasped(*found, from, X_WG) : X_WG(from).inverse() * *object.X_WO;
       return;
     }
     if (!object.hand) return;
@@ -99,7 +117,6 @@ class Plan {
     }
   }
 
- private:
   static constexpr double kForever = std::numeric_limits<double>::infinity();
   struct Shift {
     double begin = 0.0, duration = 0.0;  // s
@@ -134,12 +151,20 @@ class Plan {
     object.until = kForever;
   }
 
+  double start_time() const { return start_.state ? start_.state->time : 0.0; }
+
+  /// The mean of samples takes long: asked only of what hands hold or grasp.
+  Pose start_pose(std::size_t index) const {
+    return start_.state ? start_.state->objects[index].X_WO : mean(scene_.objects[index].pose);
+  }
+
   Pose timeline_pose(int hand, double time) const {
     const KinematicBody& body = scene_.robot[static_cast<std::size_t>(hand)];
     return body.timeline.empty() ? Pose{} : pose_at(body, time);
   }
 
   const Scene& scene_;
+  const MotionStart start_;
   std::vector<Body> bodies_;
   std::vector<Object> objects_;
 };
@@ -167,11 +192,22 @@ Pose turned_about(const Pose& X_WO, const Vector3d& pivot_O, const Vector3d& axi
 Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, int body, double time) {
   if (actions.empty()) return pose_at(scene.robot[static_cast<std::size_t>(body)], time);
   Plan plan(scene);
-  for (const Action& action : actions) {
-    if (action.time > time) break;
-    plan.begin(action);
-  }
+  plan.begin(actions, time);
   return plan.pose_of(body, time);
+}
+
+Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, const MotionStart& start, int body,
+                   double time) {
+  Plan plan(scene, start);
+  plan.begin(actions, time);
+  return plan.pose_of(body, time);
+}
+
+Pose object_pose_at(const Scene& scene, std::span<const Action> actions, const MotionStart& start, int object,
+                    double time) {
+  Plan plan(scene, start);
+  plan.begin(actions, time);
+  return plan.object_pose(object, time);
 }
 
 }  // namespace prescene::belief

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <functional>
+#include <iterator>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -57,19 +60,53 @@ std::optional<std::string> holder_at(const Scene& scene, const belief::SceneObje
   return holder;
 }
 
-/// What the hands do from `time` on, by timelines and by the actions before it, as timelines alone.
-std::vector<belief::KinematicBody> written_down(const Scene& scene, double time) {
+/// X_GO by which a hand takes an object at `time`. Exact where a state is of then, or the hand still holds it in the
+/// next one and nothing else has begun; else from the state before. X_WG: the hand's pose by the time.
+geometry::Pose grasp_in(const PlayedPart& part, int object, double time,
+                        const std::function<geometry::Pose(double)>& X_WG) {
+  const std::vector<WorldState>& states = part.trajectory.states;
+  const auto next = std::lower_bound(states.begin(), states.end(), time - kTimeRounding,
+                                     [](const WorldState& state, double t) { return state.time < t; });
+  const auto object_in = [&](const WorldState& state) { return state.objects[static_cast<std::size_t>(object)]; };
+  const auto begins_before_next = [&](const Action& action) {
+    const double begin = states.front().time + action.time;
+    return begin > time + kTimeRounding && begin < next->time - kTimeRounding;
+  };
+  if (next != states.end() && (next->time <= time + kTimeRounding ||
+                               (object_in(*next).mode == MotionMode::kHeld &&
+                                std::none_of(part.actions.begin(), part.actions.end(), begins_before_next))))
+    return X_WG(next->time).inverse() * object_in(*next).X_WO;
+  const WorldState& last = *std::prev(next);  // actions begin with the part's first state or later
+  const ObjectState then = object_in(last);
+  geometry::Pose X_WO = then.X_WO;
+  X_WO.translation += (time - last.time) * then.V_WO.linear;
+  X_WO.rotation = geometry::exp_rotation((time - last.time) * then.V_WO.angular) * X_WO.rotation;
+  return X_WG(time).inverse() * X_WO;
+}
+
+/// Where a hand is by what begins in the part before `until`.
+geometry::Pose robot_pose_of(const PlayedPart& part, int body, double time, double until) {
+  const WorldState& start = part.trajectory.start();
+  const auto end = std::find_if(part.actions.begin(), part.actions.end(), [&](const Action& action) {
+    return start.time + action.time >= until - kTimeRounding;
+  });
+  const belief::MotionStart from{&start, [&](int object, double t, const std::function<geometry::Pose(double)>& X_WG) {
+                                   return grasp_in(part, object, t, X_WG);
+                                 }};
+  return belief::robot_pose_at(part.scene, {part.actions.begin(), end}, from, body, time);
+}
+
+/// What the hands do from `time` on, by timelines and by the actions before it, as timelines alone. `part` is the one
+/// before.
+std::vector<belief::KinematicBody> written_down(const Scene& scene, const PlayedPart* part, double time) {
   std::vector<belief::KinematicBody> bodies = scene.robot;
   const bool acted =
       std::any_of(scene.actions.begin(), scene.actions.end(), [&](const Action& action) { return action.time < time; });
-  if (!acted) return bodies;
-  std::vector<Action> before;
-  for (const Action& action : scene.actions)
-    if (action.time < time) before.push_back(action);
+  if (!acted || part == nullptr) return bodies;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     bodies[i].timeline.clear();
     for (double t = time; t < scene.duration + kTimelineStep; t += kTimelineStep)
-      bodies[i].timeline.push_back({t, belief::robot_pose_at(scene, before, static_cast<int>(i), t)});
+      bodies[i].timeline.push_back({t, robot_pose_of(*part, static_cast<int>(i), t, time)});
   }
   return bodies;
 }
@@ -96,10 +133,10 @@ std::optional<Action> rest_of(const Action& action, double time) {
   return rest;
 }
 
-/// The scene as it goes on at `time`, with the objects that are there only.
-Scene scene_from(const Scene& whole, const Present& present, double time) {
+/// The scene as it goes on at `time` after `before`, with the objects that are there only.
+Scene scene_from(const Scene& whole, const PlayedPart* before, const Present& present, double time) {
   Scene scene = whole;
-  scene.robot = written_down(whole, time);
+  scene.robot = written_down(whole, before, time);
   scene.objects.clear();
   scene.actions.clear();
   for (std::size_t i = 0; i < whole.objects.size(); ++i) {
@@ -169,6 +206,12 @@ double frame_of_change(const Scene& scene, double time, double interval) {
   return frame;
 }
 
+geometry::Pose robot_pose_in(std::span<const PlayedPart> parts, int body, double time) {
+  std::size_t last = 0;
+  while (last + 1 < parts.size() && parts[last + 1].trajectory.start().time <= time + kTimeRounding) ++last;
+  return robot_pose_of(parts[last], body, time, std::numeric_limits<double>::infinity());
+}
+
 core::Result<UnannouncedChange> removal_from_text(const std::string& text) {
   const std::vector<std::string> parts = split(text, ':');
   const std::optional<double> time = number(parts[0]);
@@ -222,7 +265,9 @@ core::Result<std::vector<PlayedPart>> play_scene(const Scene& scene, std::vector
   for (std::size_t next = 0;;) {
     while (next < changes.size() && changes[next].time <= time) apply(changes[next++], start, scene, present);
     const double until = next < changes.size() ? std::min(changes[next].time, scene.duration) : scene.duration;
-    PlayedPart part{changes.empty() ? scene : scene_from(fixed, present, time), {}};
+    PlayedPart part{
+        changes.empty() ? scene : scene_from(fixed, parts.empty() ? nullptr : &parts.back(), present, time), {}, {}};
+    part.actions = changes.empty() ? fixed.actions : part.scene.actions;
     WorldState from;
     from.time = time;
     for (const std::optional<ObjectState>& object : present)

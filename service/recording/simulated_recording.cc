@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "prescene/belief/json.h"
-#include "prescene/belief/robot_motion.h"
 #include "prescene/filter/proposals/frame.h"
 #include "prescene/interfaces/images/lens_warp.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
@@ -48,9 +47,10 @@ struct Taker {
 
 class Player {
  public:
-  Player(const belief::Scene& scene, const SimulatedRecordingOptions& options, std::uint64_t seed, Backends& backends,
-         rendering::Renderer& renderer, RecordingWriter& recording)
+  Player(const belief::Scene& scene, const std::vector<PlayedPart>& parts, const SimulatedRecordingOptions& options,
+         std::uint64_t seed, Backends& backends, rendering::Renderer& renderer, RecordingWriter& recording)
       : scene_(scene),
+        parts_(parts),
         options_(options),
         backends_(backends),
         renderer_(renderer),
@@ -83,7 +83,7 @@ class Player {
   core::Status write_robot(double time) {
     interfaces::RosTfMessage message;
     for (std::size_t body = 0; body < scene_.robot.size(); ++body) {
-      const geometry::Pose X_WG = belief::robot_pose_at(scene_, scene_.actions, static_cast<int>(body), time);
+      const geometry::Pose X_WG = robot_pose_in(parts_, static_cast<int>(body), time);
       message.transforms.push_back(interfaces::to_ros_transform(
           interfaces::FrameTransform{options_.world_frame, scene_.robot[body].name, stamp(time), X_WG}));
     }
@@ -105,7 +105,7 @@ class Player {
     const Taker& taker = cameras_[turn];
     std::vector<geometry::Pose> X_WG;
     for (std::size_t body = 0; body < scene_.robot.size(); ++body) {
-      X_WG.push_back(belief::robot_pose_at(scene_, scene_.actions, static_cast<int>(body), state.time));
+      X_WG.push_back(robot_pose_in(parts_, static_cast<int>(body), state.time));
     }
     const filter::BeliefView view =
         filter::render_scene(scene, state, X_WG, filter::MeshDetail::kDisplay, backends_.meshes());
@@ -212,6 +212,7 @@ class Player {
   }
 
   const belief::Scene& scene_;
+  const std::vector<PlayedPart>& parts_;
   const SimulatedRecordingOptions& options_;
   Backends& backends_;
   rendering::Renderer& renderer_;
@@ -266,7 +267,7 @@ core::Status simulate_recording(const belief::Scene& scene, const SimulatedRecor
   PRESCENE_TRY(const std::vector<PlayedPart> parts, play_scene(scene, options.changes, backends.simulator_factory(),
                                                                interval, seed, backends.pool(), &cancellation));
   PRESCENE_TRY(const auto renderer, backends.make_renderer());
-  Player player(scene, options, seed, backends, *renderer, recording);
+  Player player(scene, parts, options, seed, backends, *renderer, recording);
 
   std::vector<Due> due;
   std::uint64_t number = 0;

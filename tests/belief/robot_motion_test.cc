@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <vector>
 
 namespace prescene::belief {
 namespace {
@@ -195,6 +198,96 @@ TEST(RobotMotion, WhatIsLetGoOfMovesTheHandNoMore) {
   EXPECT_LT((robot_pose_at(scene, actions, 0, 5.0).translation - Vector3d(0.0, 0.1, 1.2)).norm(), 1e-12);
   const std::vector<Action> unknown = {{0.2, Grasp{"spoon", "hand", {}}}, {0.3, Grasp{"cup", "foot", {}}}};
   EXPECT_LT((robot_pose_at(scene, unknown, 0, 5.0).translation - Vector3d(0.0, 0.0, 1.0)).norm(), 1e-12);
+}
+
+/// Where the cup is when it is not where the scene's mean has it.
+WorldState drawn_start(const Scene& scene, double time) {
+  geometry::Vector6d off;
+  off << 0.2, -0.1, 0.3, 0.01, -0.02, 0.03;
+  WorldState state;
+  state.time = time;
+  state.objects.resize(1);
+  state.objects[0].X_WO = geometry::box_plus(mean(scene.objects[0].pose), off);
+  return state;
+}
+
+// A state is as good as a scene whose start is fixed to it.
+TEST(RobotMotion, FollowsWhatItHoldsFromAGivenState) {
+  const Scene scene = scene_with_hand();
+  const WorldState drawn = drawn_start(scene, 0.0);
+  Scene fixed = scene;
+  fixed.objects[0].pose = FixedPose{drawn.objects[0].X_WO};
+  Tilt tilt;
+  tilt.object = "cup";
+  tilt.axis_W = Vector3d::UnitX();
+  tilt.angle = 0.7;
+  const std::vector<Action> actions = {transport_to(0.4, {0.3, 0.2, 0.8}),
+                                       {1.0, tilt},
+                                       release_at(2.2),
+                                       {2.5, Grasp{"cup", "hand", {}}},
+                                       transport_to(2.7, {-0.4, 0.1, 1.2})};
+  double most = 0.0;
+  for (double time = 0.0; time < 4.0; time += 0.05) {
+    const Pose X_WG = robot_pose_at(scene, actions, {&drawn, {}}, 0, time);
+    EXPECT_LT(geometry::box_minus(X_WG, robot_pose_at(fixed, actions, 0, time)).norm(), 1e-12) << time;
+    most = std::max(most, geometry::box_minus(X_WG, robot_pose_at(scene, actions, 0, time)).norm());
+  }
+  EXPECT_GT(most, 0.1);
+}
+
+TEST(RobotMotion, TimesOfActionsCountFromTheGivenState) {
+  const Scene scene = scene_with_hand();
+  const WorldState now = drawn_start(scene, 0.0), later = drawn_start(scene, 0.3);
+  const std::vector<Action> actions = {transport_to(0.5, {0.3, 0.2, 0.8}), release_at(1.2)};
+  std::vector<Action> sooner = actions;
+  for (Action& action : sooner) action.time -= 0.3;
+  Scene still = scene;
+  still.robot[0].timeline.resize(1);
+  for (double time = 0.3; time < 2.0; time += 0.05)
+    EXPECT_LT(geometry::box_minus(robot_pose_at(still, sooner, {&later, {}}, 0, time),
+                                  robot_pose_at(still, actions, {&now, {}}, 0, time))
+                  .norm(),
+              1e-12)
+        << time;
+  // It is held from the state's time on, whatever the hand did before.
+  const Pose X_GO = pose_at(scene.robot[0], 0.3).inverse() * later.objects[0].X_WO;
+  EXPECT_LT(
+      geometry::box_minus(object_pose_at(scene, {}, {&later, {}}, 0, 1.1), pose_at(scene.robot[0], 1.1) * X_GO).norm(),
+      1e-12);
+}
+
+TEST(RobotMotion, AGraspThatIsKnownTakesTheThingAsItIs) {
+  Scene scene = scene_with_hand();
+  scene.objects[0].held_by.reset();
+  const Pose X_GO = drawn_start(scene, 0.0).objects[0].X_WO;
+  const MotionStart known{nullptr, [&](int object, double time, const std::function<Pose(double)>& X_WG) {
+                            EXPECT_EQ(object, 0);
+                            EXPECT_EQ(time, 0.5);
+                            EXPECT_NEAR(X_WG(0.75).translation.x(), 0.75, 1e-12);
+                            return X_GO;
+                          }};
+  const std::vector<Action> actions = {{0.5, Grasp{"cup", "hand", {}}}, transport_to(1.0, {0.3, 0.2, 0.8})};
+  EXPECT_EQ(object_pose_at(scene, actions, known, 0, 0.4).translation, mean(scene.objects[0].pose).translation);
+  for (const double time : {0.5, 0.9, 1.25, 3.0})
+    EXPECT_LT(geometry::box_minus(robot_pose_at(scene, actions, known, 0, time).inverse() *
+                                      object_pose_at(scene, actions, known, 0, time),
+                                  X_GO)
+                  .norm(),
+              1e-12)
+        << time;
+  EXPECT_LT((object_pose_at(scene, actions, known, 0, 3.0).translation - Vector3d(0.3, 0.2, 0.8)).norm(), 1e-12);
+}
+
+TEST(RobotMotion, WhatIsPutDownStaysThere) {
+  Scene scene = scene_with_hand();
+  Place place;
+  place.object = "cup";
+  place.X_WO = FixedPose{Pose::from_translation({0.2, 0.0, 0.4})};
+  place.duration = 0.5;
+  const std::vector<Action> actions = {{0.5, place}, {1.5, Release{"cup", {0.0, 0.0, 0.1}, 0.2, {}}}};
+  EXPECT_LT((object_pose_at(scene, actions, {}, 0, 0.75).translation - Vector3d(0.35, 0.0, 0.65)).norm(), 1e-12);
+  for (const double time : {1.0, 1.2, 3.0})
+    EXPECT_LT((object_pose_at(scene, actions, {}, 0, time).translation - Vector3d(0.2, 0.0, 0.4)).norm(), 1e-12);
 }
 
 TEST(RobotMotion, ActionsLastAsLongAsTheyMoveSomething) {

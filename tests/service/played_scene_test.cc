@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <string>
 #include <vector>
 
-#include "prescene/belief/robot_motion.h"
+#include "prescene/interfaces/ros_messages/cdr.h"
+#include "prescene/interfaces/ros_messages/conversions.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
 #include "tests/service/recorded_box.h"
@@ -96,7 +99,7 @@ TEST_F(PlayedSceneTest, WhatAChangeDoesNotTouchGoesOnAsWithoutIt) {
   EXPECT_LT(poses.back().translation.z(), 0.05);
 }
 
-// Cameras see the hands where robot_pose_at() has them, and the robot reports these places: they are the simulator's,
+// Cameras see the hands where robot_pose_in() has them, and the robot reports these places: they are the simulator's,
 // in which what a hand grasped does not move.
 TEST_F(PlayedSceneTest, WhatIsGraspedStaysWhereItIsInTheHandThatIsShown) {
   belief::Scene scene = *scene_;
@@ -117,13 +120,117 @@ TEST_F(PlayedSceneTest, WhatIsGraspedStaysWhereItIsInTheHandThatIsShown) {
     for (const PlayedPart& part : *parts)
       for (const belief::WorldState& state : part.trajectory.states) {
         const auto held = static_cast<std::size_t>(*belief::find_object(part.scene, "held"));
-        const geometry::Pose X_WG = belief::robot_pose_at(scene, scene.actions, 0, state.time);
+        const geometry::Pose X_WG = robot_pose_in(*parts, 0, state.time);
         EXPECT_LT(geometry::box_minus(X_WG.inverse() * state.objects[held].X_WO, X_GO).norm(), 1e-3) << state.time;
       }
     EXPECT_LT((parts->back().trajectory.final().objects[changes.empty() ? 1 : 0].X_WO.translation -
                geometry::Vector3d(0, 0, 0.3))
                   .norm(),
               1e-3);
+  }
+}
+
+// Where things are at the start and where they are to go is drawn, and what was let go of lies where it fell.
+TEST_F(PlayedSceneTest, WhatIsHeldKeepsItsDrawnGraspInTheHandThatIsShown) {
+  belief::Scene scene = *scene_;
+  scene.duration = 1.4;
+  scene.robot[0].timeline[1].time = 0.2;  // it moves before it carries
+  geometry::Matrix6d spread = geometry::Matrix6d::Zero();
+  spread.diagonal() << 0.01, 0.01, 0.01, 1e-4, 1e-4, 1e-6;
+  const geometry::Pose mean_start = geometry::Pose::from_translation({0.2, 0.0, 0.26});
+  scene.objects[1].pose = belief::NormalPose{mean_start, spread};
+  geometry::Matrix6d goal_spread = geometry::Matrix6d::Zero();
+  goal_spread.diagonal() << 1e-4, 1e-4, 0.01, 1e-4, 1e-4, 0.0;
+  const belief::NormalPose low{geometry::Pose::from_translation({0.2, 0.1, 0.032}), goal_spread};
+  const belief::FixedPose high{geometry::Pose::from_translation({0.1, 0.1, 0.3})};
+  // It is taken between two frames and lifted before the next one, or after it. A way begins at a whole step.
+  for (const double lifted : {0.95, 1.025}) {
+    scene.actions = {{0.1, belief::Transport{"held", low, 0.2}},
+                     {0.35, belief::Release{"held", {0.0, 0.0, 0.1}, 0.05, {}}},
+                     {0.92, belief::Grasp{"held", "hand", {}}},
+                     {lifted, belief::Transport{"held", high, 0.15}}};
+    ASSERT_TRUE(belief::validate(scene).ok());
+    for (const std::vector<UnannouncedChange>& changes :
+         {std::vector<UnannouncedChange>{}, std::vector<UnannouncedChange>{{0.3, "left", std::nullopt}},
+          std::vector<UnannouncedChange>{{0.1, "left", std::nullopt}, {0.6, "left", mean_start}}}) {
+      const auto parts = play_scene(scene, changes, backends_.simulator_factory(), kFrameInterval, 1, pool_);
+      ASSERT_TRUE(parts.ok()) << parts.status().message();
+      std::vector<geometry::Pose> first, second;  // X_GO of both times that it is held
+      for (const PlayedPart& part : *parts)
+        for (const belief::WorldState& state : part.trajectory.states) {
+          const auto held = static_cast<std::size_t>(*belief::find_object(part.scene, "held"));
+          const geometry::Pose X_GO = robot_pose_in(*parts, 0, state.time).inverse() * state.objects[held].X_WO;
+          if (state.time < 0.34) first.push_back(X_GO);
+          if (state.time > 0.95) second.push_back(X_GO);
+        }
+      ASSERT_EQ(first.size(), 4u);
+      ASSERT_EQ(second.size(), 5u);
+      const geometry::Pose X_GO_mean = belief::pose_at(scene.robot[0], 0.0).inverse() * mean_start;
+      EXPECT_GT(geometry::box_minus(first[0], X_GO_mean).norm(), 0.02);
+      for (const geometry::Pose& X_GO : first) EXPECT_LT(geometry::box_minus(X_GO, first[0]).norm(), 1e-3);
+      EXPECT_GT((second[0].translation - first[0].translation).norm(), 0.05);  // the hand had backed off
+      for (const geometry::Pose& X_GO : second) EXPECT_LT(geometry::box_minus(X_GO, second.back()).norm(), 1e-3);
+      const belief::WorldState& end = parts->back().trajectory.final();
+      EXPECT_LT(
+          (end.objects[static_cast<std::size_t>(*belief::find_object(parts->back().scene, "held"))].X_WO.translation -
+           high.X_WO.translation)
+              .norm(),
+          1e-3);
+    }
+  }
+}
+
+// The robot's own words and the truth that are in one recording.
+TEST_F(PlayedSceneTest, TheHandThatARecordingReportsKeepsItsDrawnGrasp) {
+  const std::string scene = R"(
+name: carried
+duration: 1.0
+models:
+  box: {box: [0.1, 0.1, 0.1], mass: 0.4}
+supports:
+  table: {box: [0.8, 0.8, 0.04], pose: {position: [0, 0, -0.02]}}
+robot:
+  hand: {box: [0.05, 0.05, 0.02], pose: {position: [0, 0, 0.3]}}
+objects:
+  box: {model: box, held_by: hand, pose: {position: [0, 0, 0.23], normal: {position: [0.01, 0.01, 0.01], rotation_deg: [5, 5, 5]}}}
+actions:
+  - {time: 0.2, transport: {object: box, pose: {position: [0.1, 0.1, 0.2], rotation: {euler_deg: [0, 0, 40]}}, duration: 0.5}}
+camera:
+  width: 80
+  height: 60
+  fov_deg: 55
+  look: {from: [0.55, -0.5, 0.5], at: [0, 0, 0.2]}
+)";
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "carried.mcap";
+  const core::Status recorded = tests::record_scene(scene, {}, 10.0, path);
+  ASSERT_TRUE(recorded.ok()) << recorded.message();
+  const auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader.ok()) << reader.status().message();
+  std::map<core::TimeNs, geometry::Pose> hand, box;
+  for (;;) {
+    const auto entry = (*reader)->next();
+    ASSERT_TRUE(entry.ok());
+    if (!*entry) break;
+    const interfaces::ReceivedMessage& message = (*entry)->message;
+    if (message.topic == kTruthTopic) {
+      const auto record = truth_from_json(std::string(message.cdr.begin(), message.cdr.end()));
+      ASSERT_TRUE(record.ok());
+      box[record->stamp_ns] = record->objects.at(0).X_WO;
+    } else if (message.topic == InputTopics{}.tf) {
+      const auto tf = interfaces::decode_cdr<interfaces::RosTfMessage>(message.cdr);
+      ASSERT_TRUE(tf.ok());
+      const auto transforms = interfaces::to_transforms(*tf);
+      ASSERT_TRUE(transforms.ok());
+      hand[transforms->accepted.at(0).stamp_ns] = transforms->accepted.at(0).X_PC;
+    }
+  }
+  ASSERT_EQ(box.size(), 11u);
+  const geometry::Pose X_GO = hand.begin()->second.inverse() * box.begin()->second;
+  for (const auto& [stamp_ns, X_WO] : box) {
+    const auto then = hand.lower_bound(stamp_ns - 1000);
+    ASSERT_TRUE(then != hand.end() && then->first <= stamp_ns + 1000) << stamp_ns;
+    EXPECT_LT(geometry::box_minus(then->second.inverse() * X_WO, X_GO).norm(), 1e-3) << stamp_ns;
   }
 }
 
@@ -141,9 +248,9 @@ TEST_F(PlayedSceneTest, AHandThatBackedOffTakesTheNextThingToItsGoal) {
   const belief::WorldState& end = parts->back().trajectory.final();
   EXPECT_LT((end.objects[0].X_WO.translation - goal).norm(), 1e-3);
   const geometry::Vector3d grasped_from = belief::mean(scene.objects[0].pose).translation;
-  const geometry::Vector3d moved = belief::robot_pose_at(scene, scene.actions, 0, end.time).translation -
-                                   belief::robot_pose_at(scene, scene.actions, 0, 0.3).translation;
-  EXPECT_LT((moved - (goal - grasped_from)).norm(), 1e-9);
+  const geometry::Vector3d moved =
+      robot_pose_in(*parts, 0, end.time).translation - robot_pose_in(*parts, 0, 0.3).translation;
+  EXPECT_LT((moved - (goal - grasped_from)).norm(), 1e-3);
 }
 
 TEST_F(PlayedSceneTest, APushUnderWayGoesOn) {

@@ -2,9 +2,11 @@
 // Where the robot's bodies are while actions are executed.
 #pragma once
 
+#include <functional>
 #include <span>
 
 #include "prescene/belief/scene.h"
+#include "prescene/belief/world_state.h"
 
 namespace prescene::belief {
 
@@ -16,6 +18,22 @@ namespace prescene::belief {
 /// that is when it is grasped follows from the scene's mean start and the actions before, as if nothing else had moved
 /// it. `actions` ascend in time.
 Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, int body, double time);
+
+/// From where hands are followed, where more is known than the scene's mean start.
+struct MotionStart {
+  const WorldState* state = nullptr;  ///< Of the scene's objects; null: the mean start. Must outlive the call.
+  /// X_GO by which a hand takes that object at `time` (s); X_WG(t): where the hand is from then on as long as no other
+  /// action begins. Empty: it takes the object where the start, or the hand that let go of it last, left it.
+  std::function<Pose(int object, double time, const std::function<Pose(double t)>& X_WG)> grasped = {};
+};
+
+/// The same of one instance: times of actions count from the start's, `time` from the scene's start. Drawn actions have
+/// fixed goals.
+Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, const MotionStart& start, int body,
+                   double time);
+/// X_WO of object number `object` then: where its hand has it, else where it was left.
+Pose object_pose_at(const Scene& scene, std::span<const Action> actions, const MotionStart& start, int object,
+                    double time);
 
 /// For how long (s) an action moves something: a release, while the hand retreats. 0 for what is done at once.
 double duration_of(const Action& action);

@@ -38,7 +38,13 @@ core::Result<UnannouncedChange> put_from_text(const std::string& text);
 struct PlayedPart {
   belief::Scene scene;            ///< With the objects that are there, in the order of the whole scene.
   belief::Trajectory trajectory;  ///< A state each frame, up to the frame before the next change.
+  /// What is done in it, as drawn; times from its first state's. A push is in each part that it goes on in.
+  std::vector<belief::Action> actions = {};
 };
+
+/// X_WG of robot body number `body` at `time` (s since the scene's start), as what it holds has been drawn and grasped:
+/// between two states of a part, too. `parts` are of play_scene().
+geometry::Pose robot_pose_in(std::span<const PlayedPart> parts, int body, double time);
 
 /// When a change that is to be at `time` (s) takes place in a scene that is sampled every `interval` s: at the nearest
 /// frame, or the scene's end.
