@@ -54,6 +54,26 @@ belief::PoseDistribution displaced(belief::PoseDistribution own, const geometry:
   return own;
 }
 
+/// The scene's carry that brings an object to where its own action begins.
+struct Carry {
+  std::size_t at = 0;  // among the scene's actions
+  Pose X_WO;           // where it ends
+  Pose X_since;        // what hands do with the object from then on, until its own action begins at X_since * X_WO
+
+  Carry(const belief::Scene& scene, std::size_t action, const Pose& X_begin)
+      : at(action),
+        X_WO(belief::mean(std::get<belief::Transport>(scene.actions[action].what).X_WO)),
+        X_since(X_begin * X_WO.inverse()) {}
+
+  /// So that the own action begins at X_begin.
+  void lead_to(const Pose& X_begin, std::vector<Action>& actions) const {
+    auto& transport = std::get<belief::Transport>(actions[at].what);
+    const Pose X_end = X_since.inverse() * X_begin;
+    transport.X_WO = displaced(std::move(transport.X_WO), X_end.rotation * X_WO.rotation.conjugate(),
+                               X_end.translation - X_WO.translation);
+  }
+};
+
 class TiltPlan final : public OwnActionPlan {
  public:
   using OwnActionPlan::OwnActionPlan;
@@ -79,12 +99,13 @@ class PourPlan final : public OwnActionPlan {
   using OwnActionPlan::OwnActionPlan;
   core::Status prepare(std::vector<SceneValue>& scene_values) override {
     const auto& own = std::get<belief::Pour>(own_.what);
-    carry_ = carry_before();
-    if (chosen("height") && !carry_)
+    const auto carry = carry_before();
+    if (chosen("height") && !carry)
       return core::invalid_input("height: the scene carries '" + name_ +
                                  "' nowhere before it is poured out, so that there is no height to choose: give the "
                                  "scene a transport of it, or leave the height out");
     X_begin_ = begin_pose();
+    if (carry) carry_.emplace(*scene_, *carry, X_begin_);
     const double z = X_begin_.translation.z();
     scene_values.push_back({"height", z, z - kAbove, z + kAbove});
     scene_values.push_back({"angle_deg", own.angle / geometry::kDegree, 0.0, 180.0});
@@ -93,10 +114,7 @@ class PourPlan final : public OwnActionPlan {
     return add_time(scene_values);
   }
   void lead_up_to(std::span<const double> values, belief::WorldState&, std::vector<Action>& actions) const override {
-    if (!chosen("height")) return;
-    auto& transport = std::get<belief::Transport>(actions[*carry_].what);
-    const Vector3d up(0.0, 0.0, value("height", values) - X_begin_.translation.z());
-    transport.X_WO = displaced(std::move(transport.X_WO), geometry::Quaterniond::Identity(), up);
+    if (const auto X_goal = goal(values)) carry_->lead_to(*X_goal, actions);
   }
   std::optional<Pose> goal(std::span<const double> values) const override {
     if (!chosen("height")) return std::nullopt;
@@ -114,7 +132,7 @@ class PourPlan final : public OwnActionPlan {
   }
 
  private:
-  std::optional<std::size_t> carry_;
+  std::optional<Carry> carry_;
   Pose X_begin_;
 };
 
@@ -123,8 +141,8 @@ class InsertPlan final : public OwnActionPlan {
   using OwnActionPlan::OwnActionPlan;
   core::Status prepare(std::vector<SceneValue>& scene_values) override {
     const auto& own = std::get<belief::Insert>(own_.what);
-    carry_ = carry_before();
     X_begin_ = begin_pose();
+    if (const auto carry = carry_before()) carry_.emplace(*scene_, *carry, X_begin_);
     moves_ = chosen("x") || chosen("y") || chosen("yaw_deg");
     if (moves_ && !carry_ && !scene_->objects[index_].held_by)
       return core::invalid_input("x, y, yaw_deg: '" + name_ +
@@ -147,9 +165,7 @@ class InsertPlan final : public OwnActionPlan {
     if (!moves_) return;
     const Pose X_goal = *goal(values);
     if (carry_) {
-      auto& transport = std::get<belief::Transport>(actions[*carry_].what);
-      transport.X_WO = displaced(std::move(transport.X_WO), X_goal.rotation * X_begin_.rotation.conjugate(),
-                                 X_goal.translation - X_begin_.translation);
+      carry_->lead_to(X_goal, actions);
       return;
     }
     // What is not known of how it lies in the hand stays as it is. The hand's own motion until then is undone and done.
@@ -179,7 +195,7 @@ class InsertPlan final : public OwnActionPlan {
   }
 
  private:
-  std::optional<std::size_t> carry_;
+  std::optional<Carry> carry_;
   Pose X_begin_;
   bool moves_ = false;
 };

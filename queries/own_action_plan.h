@@ -116,18 +116,9 @@ class OwnActionPlan : public PlannedAction {
     const belief::Action* after = nullptr;
   };
   Slot slot() const;
-  /// Where the object is, if nothing is uncertain, when its own action begins: where that carry has brought it, or its
-  /// hand.
-  belief::Pose begin_pose() const {
-    if (const auto carry = carry_before())
-      return belief::mean(std::get<belief::Transport>(scene_->actions[*carry].what).X_WO);
-    const belief::Pose& X_WO = prior_.likeliest.objects[index_].X_WO;
-    const belief::SceneObject& object = scene_->objects[index_];
-    const auto hand = object.held_by ? belief::find_robot_body(*scene_, *object.held_by) : std::nullopt;
-    if (!hand) return X_WO;
-    const belief::KinematicBody& body = scene_->robot[static_cast<std::size_t>(*hand)];
-    return belief::pose_at(body, own_.time) * belief::pose_at(body, 0.0).inverse() * X_WO;
-  }
+  /// Where the object is, if nothing is uncertain, when its own action begins, and that carry, if there is one, is
+  /// over.
+  belief::Pose begin_pose() const;
 
   std::size_t index_;
   std::string name_;

@@ -2,6 +2,7 @@
 // The scene's own actions: which one, what is like it where there is none, and those of a hand that holds nothing yet.
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "own_action_plan.h"
@@ -170,6 +171,14 @@ core::Status OwnActionPlan::add_force(const char* name, const belief::ScalarDist
   }
   scene_values.push_back(std::move(value));
   return {};
+}
+
+belief::Pose OwnActionPlan::begin_pose() const {
+  const std::span<const Action> before(scene_->actions.data(), at_.value_or(scene_->actions.size()));
+  double time = own_.time;
+  if (const auto carry = carry_before())
+    time = std::max(time, before[*carry].time + belief::duration_of(before[*carry]));
+  return belief::object_pose_at(*scene_, before, {&prior_.likeliest, {}}, static_cast<int>(index_), time);
 }
 
 OwnActionPlan::Slot OwnActionPlan::slot() const {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -250,6 +251,55 @@ TEST(OwnActions, TheBestChoiceIsAsGoodAsItIsPredictedWhereItIsWrittenInTheScene)
     ASSERT_TRUE(told.best.action);
     EXPECT_EQ(belief::kind_of(*told.best.action), one.kind);
   }
+}
+
+Pose at_height(double x, double z) { return Pose::from_translation({x, 0.0, z}); }
+
+// It was grasped after the start, and the hand has moved since then.
+TEST(OwnActions, ASpeedIsAlongTheWayFromWhereTheHandHasBroughtWhatItGrasped) {
+  Case one = cases().back();
+  ASSERT_EQ(one.kind, "transport");
+  one.carried = false;
+  one.own = {1.0, carry_to({0.7, 0.4, 0.5}, 1.0)};  // half a metre from (0.4, 0, 0.5)
+  one.miss = [](const std::vector<Action>&, const belief::WorldState&) { return 0.0; };
+  auto scene = scene_of(one);
+  scene->objects[0].held_by.reset();
+  scene->robot[0].timeline = {{0.0, at_height(-0.1, 0.75)}, {0.2, at_height(0.0, 0.75)}, {0.8, at_height(0.4, 0.75)}};
+  scene->actions.insert(scene->actions.begin(), {0.2, belief::Grasp{"carton", "hand", {}}});
+  AchieveQuery query = question(one);
+  query.free = {{"time", 1.0, 1.2}};
+  query.fixed = {{"speed", 0.8}};
+  core::ThreadPool pool(2);
+  const Answer answer = queries::answer(scene, 1, {"q", query}, tests::context_with(law_of(one), pool));
+  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
+  const auto& told = std::get<AchieveAnswer>(answer.what);
+  ASSERT_TRUE(told.best.action);
+  EXPECT_NEAR(std::get<belief::Transport>(told.best.action->what).duration, 0.5 / 0.8, 1e-9);
+}
+
+// Another hand takes over what was carried, and lifts it by 0.2 m.
+TEST(OwnActions, ACarryLeadsToTheHeightThatIsChosenWhateverHandsDoAfterIt) {
+  const std::vector<Case> all = cases();
+  Case one = *std::find_if(all.begin(), all.end(), [](const Case& c) { return c.kind == "pour"; });
+  one.own.time = 2.0;
+  one.miss = [](const std::vector<Action>& actions, const belief::WorldState&) {
+    return std::abs(height_of(own_of<belief::Transport>(actions).X_WO) - 0.65) < 1e-9 ? 0.0 : 10.0;
+  };
+  auto scene = scene_of(one);
+  belief::KinematicBody other = scene->robot[0];
+  other.name = "other";
+  other.timeline = {{1.2, at_height(0.3, 0.6)}, {1.8, at_height(0.3, 0.8)}};
+  scene->robot.push_back(other);
+  scene->duration = 4.0;
+  scene->actions.insert(scene->actions.begin() + 1, {1.0, belief::Grasp{"carton", "other", {}}});
+  AchieveQuery query = question(one);
+  query.free = {{"angle", 0.0, 150.0}};
+  query.fixed = {{"height", 0.85}};
+  core::ThreadPool pool(2);
+  const Answer answer = queries::answer(scene, 1, {"q", query}, tests::context_with(law_of(one), pool));
+  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
+  EXPECT_TRUE(std::get<AchieveAnswer>(answer.what).found);
+  EXPECT_GE(std::get<AchieveAnswer>(answer.what).best.lower, 0.95);
 }
 
 TEST(OwnActions, GiveTheSameBitsForAnyNumberOfThreads) {
