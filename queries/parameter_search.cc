@@ -16,8 +16,12 @@ namespace {
 // Scenarios of the search: each explored point has its own, by its number in the net; points near successes have
 // others; in races and surveys all points meet the same.
 constexpr std::uint32_t kLocalScenarios = 1U << 23U, kCommonScenarios = 1U << 24U;
-constexpr int kMostTests = 20;       // of points: the error that is left then is nothing
-constexpr std::size_t kElites = 24;  // points that race
+// Points of the net that are tried at first, and after how many of these what is known is told. Sixteen trials fill a
+// vector of eight lanes on each of two threads: fewer hardly take less time. Only the last number changes results.
+constexpr std::size_t kFirstPoints[] = {16, 32, 64, 128};
+constexpr std::size_t kMostTries = 64;  // points of the net that are looked at for one that is possible
+constexpr int kMostTests = 20;          // of points: the error that is left then is nothing
+constexpr std::size_t kElites = 24;     // points that race
 
 class Search {
  public:
@@ -53,10 +57,11 @@ class Search {
  private:
   // ---- exploring
 
-  /// Adds so many possible points of the net; fewer where hardly anything is possible.
-  void explore(std::size_t count, std::vector<TriedPoints::Pending>& pending) {
-    std::size_t found = 0;
-    for (std::size_t tries = 0; found < count && tries < 64 * count; ++tries) {
+  /// Adds so many possible points of the net, fewer where hardly anything is possible: `most` are looked at. Returns
+  /// how many were.
+  std::size_t explore(std::size_t count, std::size_t most, std::vector<TriedPoints::Pending>& pending) {
+    std::size_t found = 0, tries = 0;
+    for (; found < count && tries < most; ++tries) {
       UnitPoint at(dimensions_);
       const std::uint32_t number = next_in_net_++;
       net_.point(number, at);
@@ -65,6 +70,26 @@ class Search {
       pending.push_back({index, number});
       ++found;
     }
+    return tries;
+  }
+
+  /// Tries the first points of the net, and tells what is known after each part of them but the last. Whether the
+  /// search goes on.
+  bool try_first_points() {
+    constexpr std::size_t kAll = kFirstPoints[std::size(kFirstPoints) - 1];
+    // All at once fill the lanes better, for who waits for the answer; but a limit within them is kept either way.
+    const bool in_parts = on_round_ || options_.exact_trials.value_or(options_.max_trials) < static_cast<int>(kAll);
+    std::size_t found = 0, tries = 0;
+    for (const std::size_t count : kFirstPoints) {
+      if (!in_parts && count < kAll) continue;
+      if (found > 0) tell(tried_.ranked());
+      std::vector<TriedPoints::Pending> pending;
+      tries += explore(count - found, kMostTries * count - tries, pending);
+      found += pending.size();
+      if (!pending.empty() && !tried_.run_pending(pending)) return false;
+      if (tried_.over()) break;
+    }
+    return found > 0;
   }
 
   void note_leaders(const std::vector<TriedPoints::Ranked>& order) {
@@ -135,24 +160,28 @@ class Search {
 
   // ---- the course of the search
 
+  /// A round of trials after the first points. Whether the search goes on.
+  bool try_round() {
+    constexpr std::size_t kExplored = 64, kNear = 32;
+    std::vector<TriedPoints::Pending> pending;
+    const std::vector<TriedPoints::Ranked> order = tried_.ranked();
+    // Leaders of which too little is known race among themselves first, as exploring costs more.
+    race(order, 48, 16, 0.7, pending);
+    if (pending.size() < 8) {
+      pending.clear();
+      explore(kExplored, kMostTries * kExplored, pending);
+      explore_near(order, order.empty() ? 0 : kNear, pending);
+      race(order, 64, 128, 0.5, pending);
+    }
+    return !pending.empty() && tried_.run_pending(pending);
+  }
+
   void find_first() {
     // A leading point is worth a test when the search takes it for a little better than wanted.
     const double worth_testing = options_.wanted + 0.15 * (1.0 - options_.wanted);
-    std::size_t to_explore = 128;
-    while (!tried_.over() && result_.first < 0) {
-      std::vector<TriedPoints::Pending> pending;
-      const std::vector<TriedPoints::Ranked> order = tried_.ranked();
-      // Leaders of which too little is known race among themselves first, as exploring costs more.
-      race(order, 48, 16, 0.7, pending);
-      if (pending.size() < 8) {
-        pending.clear();
-        explore(to_explore, pending);
-        explore_near(order, order.empty() ? 0 : 32, pending);
-        race(order, 64, 128, 0.5, pending);
-        to_explore = 64;
-      }
-      if (pending.empty()) return;  // nothing is possible anywhere
-      if (!tried_.run_pending(pending)) return;
+    if (tried_.over() || !try_first_points()) return;  // nothing is possible anywhere
+    for (bool begun = false; result_.first < 0; begun = true) {
+      if (begun && (tried_.over() || !try_round())) return;
       const std::vector<TriedPoints::Ranked> after = tried_.ranked();
       tell(after);
       for (const TriedPoints::Ranked& candidate : after) {
@@ -175,7 +204,7 @@ class Search {
     for (int round = 0; round < kRounds && !tried_.over(); ++round) {
       std::vector<TriedPoints::Pending> pending;
       const std::vector<TriedPoints::Ranked> order = tried_.ranked();
-      explore(16, pending);
+      explore(16, kMostTries * 16, pending);
       explore_near(order, 48, pending);
       race(order, 96, 32, 0.5, pending);
       if (!tried_.run_pending(pending)) return;

@@ -36,7 +36,13 @@ bool TriedPoints::run_pending(std::vector<Pending>& pending) {
   std::vector<Trial> trials;
   for (const Pending& one : pending) trials.push_back({points_[one.point].at, one.scenario, false});
   std::vector<TrialEnd> ends(trials.size());
-  if (!run_trials(trials, ends)) return false;
+  if (!run_trials(trials, ends)) {
+    // What was stopped says nothing of its points, as if they had not been chosen yet.
+    points_.resize(round_.points);
+    result_.explored = round_.explored;
+    result_.explored_impossible = round_.impossible;
+    return false;
+  }
   for (std::size_t i = 0; i < pending.size(); ++i) {
     SearchPoint& point = points_[pending[i].point];
     const bool succeeded = ends[i] == TrialEnd::kSucceeds;
@@ -49,6 +55,7 @@ bool TriedPoints::run_pending(std::vector<Pending>& pending) {
     if (point.explored && point.trials == 1) result_.explored_successes += succeeded;
   }
   pending.clear();
+  round_ = {points_.size(), result_.explored, result_.explored_impossible};
   return true;
 }
 

@@ -40,7 +40,8 @@ class TriedPoints {
 
   /// Returns the point's number. `explored`: it is one of the net's.
   std::size_t add(UnitPoint at, bool explored);
-  /// Runs trials at points of the search and counts them; false once the search is over.
+  /// Runs trials at points of the search and counts them; false once the search is over. If they are stopped, the
+  /// points that were added for them are dropped.
   bool run_pending(std::vector<Pending>& pending);
   /// Counts towards the limits. The trials count for something even if they reach a limit: then nothing comes after.
   bool run_trials(std::span<const Trial> trials, std::span<TrialEnd> ends);
@@ -62,6 +63,10 @@ class TriedPoints {
   std::size_t dimensions_;
   SearchResult& result_;
   std::vector<SearchPoint> points_;
+  struct {
+    std::size_t points = 0;
+    int explored = 0, impossible = 0;
+  } round_;  // what there was after the last trials that were finished
   bool over_ = false;
 };
 

@@ -264,9 +264,48 @@ TEST(ParameterSearch, EndsWithinItsLimitAndWhenItIsStopped) {
   EXPECT_LE(result.all_trials, 400);
 }
 
+TEST(ParameterSearch, OfFewTrialsTakesHardlyMore) {
+  for (const int most : {1, 16, 17, 60, 100, 128}) {
+    SearchOptions options = options_of(3, 2);
+    options.max_trials = most;
+    const SearchResult limited = searched([](std::span<const double>) { return 0.3; }, options, 2);
+    EXPECT_EQ(limited.stop, SearchStop::kMaxTrials);
+    EXPECT_GE(limited.search_trials, most);
+    EXPECT_LE(limited.search_trials, std::max(16, 2 * most));
+  }
+}
+
+// The first points are those of one net, however many are tried at once: also where few of them are possible.
+TEST(ParameterSearch, TellsFromTheFirstFewTrialsOn) {
+  for (const double possible : {1.0, 0.1, 0.02}) {
+    const Probability probability = [&](std::span<const double> point) { return point[0] < possible ? 0.4 : -1.0; };
+    std::vector<SearchResult> told;
+    SearchOptions options = options_of(2, 3);
+    options.max_trials = 128;
+    KnownTrials trials(probability, 3);
+    const SearchResult result = search_parameters(trials, options, core::RandomStream(3, core::Purpose::kTest), {},
+                                                  [&](const SearchResult& so_far) { told.push_back(so_far); });
+    ASSERT_GE(told.size(), 3u) << possible;
+    for (std::size_t i = 0; i < told.size(); ++i) {
+      EXPECT_EQ(told[i].all_trials, told[i].explored - told[i].explored_impossible) << "each has been tried once";
+      EXPECT_LE(told[i].all_trials, 16 << i);
+      if (i > 0) {
+        EXPECT_GT(told[i].all_trials, told[i - 1].all_trials);
+      }
+      EXPECT_FALSE(told[i].leaders.empty());
+    }
+    const SearchResult untold = searched(probability, options, 3);
+    EXPECT_EQ(untold.explored, result.explored);
+    EXPECT_EQ(untold.explored_successes, result.explored_successes);
+    ASSERT_EQ(untold.points.size(), result.points.size());
+    for (std::size_t i = 0; i < result.points.size(); ++i) EXPECT_EQ(untold.points[i].at, result.points[i].at);
+    EXPECT_NEAR(static_cast<double>(result.explored - result.explored_impossible) / result.explored, possible, 0.02);
+  }
+}
+
 TEST(ParameterSearch, RepeatsWhatWasStoppedByItsNumberOfTrials) {
   const Probability probability = box_of({0.4, 0.5, 0.6}, 0.05);
-  for (const int until : {300, 700, 1500}) {
+  for (const int until : {20, 50, 100, 300, 700, 1500}) {
     KnownTrials stopped(probability, 4);
     stopped.stop_after(until);
     const SearchResult cut = search_parameters(stopped, options_of(3, 4), core::RandomStream(4, core::Purpose::kTest));
@@ -275,6 +314,9 @@ TEST(ParameterSearch, RepeatsWhatWasStoppedByItsNumberOfTrials) {
     exact.exact_trials = cut.search_trials;
     const SearchResult again = searched(probability, exact, 4);
     EXPECT_EQ(again.search_trials, cut.search_trials);
+    EXPECT_EQ(again.explored, cut.explored) << "points whose trials were stopped are not counted";
+    EXPECT_EQ(again.explored_impossible, cut.explored_impossible);
+    EXPECT_EQ(again.explored_successes, cut.explored_successes);
     ASSERT_EQ(again.claims.size(), cut.claims.size());
     for (std::size_t i = 0; i < cut.claims.size(); ++i) {
       EXPECT_EQ(again.claims[i].at, cut.claims[i].at);
