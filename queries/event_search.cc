@@ -17,6 +17,7 @@ constexpr int kLaterFirstPoints = 2;  // times the points of a run, that are dra
 constexpr int kMostRounds = 2;        // times the query's runs: of what stays uncertain
 constexpr double kHopeless = 25.0;    // nats: what is so far behind the best is not searched further
 constexpr double kMayMatter = 0.01;   // probability from which on an event that was not searched is named
+constexpr double kMoreToTell = 1.5;   // times the instances: a look draws from all evidences, which takes its time
 constexpr int kFreshRuns = 1000;      // numbers of runs from here on are for what must not have been seen
 constexpr double kLikelierThanSeen =
     3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
@@ -32,6 +33,15 @@ int round_of(const Hypothesis& hypothesis) {
 }
 
 int runs_of(const Judged& judged) { return static_cast<int>(judged.posterior.log_evidence.size()); }
+
+/// Of the `hypothesis`-th of `hypotheses`, about the `candidate`-th object; nothing was found of it yet.
+Judged judged_of(const Hypothesis& what, std::size_t candidate, std::size_t hypothesis, std::size_t hypotheses) {
+  Judged judged;
+  judged.hypothesis = what;
+  judged.object = what.object;
+  judged.number = candidate * (hypotheses + 1) + 1 + hypothesis;
+  return judged;
+}
 
 core::Status stopped_searching() { return core::cancelled("stopped on request before all events were weighed"); }
 
@@ -49,10 +59,11 @@ std::vector<LatentPoint> equal_draws(const TemperedResult& posterior) {
   return draws;
 }
 
-core::Status EventSearch::run(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses) {
-  PRESCENE_RETURN_IF_ERROR(search_all(candidates, hypotheses));
+core::Status EventSearch::run(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses,
+                              const Look& look) {
+  PRESCENE_RETURN_IF_ERROR(search_all(candidates, hypotheses, look));
   PRESCENE_RETURN_IF_ERROR(search_rivals());
-  return narrow_intervals();
+  return narrow_intervals(look);
 }
 
 std::vector<LatentPoint> EventSearch::fresh_draws(const Judged& judged, int number) {
@@ -92,9 +103,28 @@ std::vector<std::string> EventSearch::remarks() const {
   return remarks;
 }
 
+/// Tells what is known before all hypotheses were searched once, if that is much more than when it was told last.
+void EventSearch::tell(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses,
+                       const Look& look) {
+  if (!look || out_of_time_ || evaluated_ < kMoreToTell * told_at_) return;
+  told_at_ = evaluated_;
+  std::vector<Judged> nothings = nothings_, judged = judged_;
+  for (std::size_t c = 0; c < candidates.size(); ++c)
+    for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+      if (hypotheses[i].object != candidates[c] || round_of(hypotheses[i]) < 0) continue;
+      const Judged open = judged_of(hypotheses[i], c, i, hypotheses.size());
+      if (std::any_of(judged_.begin(), judged_.end(), [&](const Judged& known) { return known.number == open.number; }))
+        continue;
+      leave_open(judged.emplace_back(open));
+    }
+  if (judged.empty()) return;
+  weigh_events(nothings, judged, query_.confidence, query_.seed);
+  look(std::move(nothings), std::move(judged));
+}
+
 /// Each hypothesis once; those that can't compete end early, and those that there is no time for are left open.
 core::Status EventSearch::search_all(const std::vector<std::size_t>& candidates,
-                                     const std::vector<Hypothesis>& hypotheses) {
+                                     const std::vector<Hypothesis>& hypotheses, const Look& look) {
   double prior_of_nothing = 0.0;
   std::size_t simulated = events_.is_still() ? 0 : candidates.size();
   for (const Hypothesis& h : hypotheses) {
@@ -113,21 +143,18 @@ core::Status EventSearch::search_all(const std::vector<std::size_t>& candidates,
     search(nothing, query_.runs, share_of_time(simulated));
     if (!events_.is_still()) --simulated;
   }
+  tell(candidates, hypotheses, look);
   for (int round = 0; round < kRounds; ++round)
     for (std::size_t c = 0; c < candidates.size(); ++c)
       for (std::size_t i = 0; i < hypotheses.size(); ++i) {
         if (hypotheses[i].object != candidates[c] || round_of(hypotheses[i]) != round) continue;
         if (cancelled()) return stopped_searching();
-        Judged& judged = judged_.emplace_back();
-        judged.hypothesis = hypotheses[i];
-        judged.object = candidates[c];
-        judged.number = c * (hypotheses.size() + 1) + 1 + i;
-        if (round > 0 && out_of_time()) {
-          judged.posterior.unfinished = true;
-          note_evidence(judged, best_ - kHopeless - std::log(hypotheses[i].prior));
-        } else {
+        Judged& judged = judged_.emplace_back(judged_of(hypotheses[i], c, i, hypotheses.size()));
+        if (round > 0 && out_of_time())
+          leave_open(judged);
+        else
           search(judged, kFirstRuns, share_of_time(round + 1 == kRounds ? simulated-- : 1));
-        }
+        if (round > 0) tell(candidates, hypotheses, look);
       }
   return core::ok_status();
 }
@@ -152,9 +179,10 @@ core::Status EventSearch::search_rivals() {
 }
 
 /// More runs of those whose intervals are wide, as long as there is time.
-core::Status EventSearch::narrow_intervals() {
+core::Status EventSearch::narrow_intervals(const Look& look) {
   for (;;) {
     weigh_events(nothings_, judged_, query_.confidence, query_.seed);
+    if (look) look(nothings_, judged_);
     if (cancelled()) return stopped_searching();
     // Whichever of the uncertain ones has the fewest runs.
     Judged* least = nullptr;
@@ -237,6 +265,12 @@ void EventSearch::note_evidence(Judged& judged, double log_evidence) {
     judged.may_be_more = std::max(0.0, std::min(judged.posterior.at_most, most_likely(judged.object)) - log_evidence);
   else if (!judged.posterior.gave_up)
     best_ = std::max(best_, std::log(judged.hypothesis.prior) + log_evidence);
+}
+
+/// Of what was not searched.
+void EventSearch::leave_open(Judged& judged) {
+  judged.posterior.unfinished = true;
+  note_evidence(judged, best_ - kHopeless - std::log(judged.hypothesis.prior));
 }
 
 TemperedTarget EventSearch::target_of(const Hypothesis& hypothesis) {

@@ -29,9 +29,14 @@ class EventSearch {
               const ExplainQuery& query, const QueryContext& context)
       : events_(events), likelihood_(likelihood), times_(times), query_(query), context_(context) {}
 
+  /// Told of each look at what is known so far, with a copy of it: all hypotheses, also those that were not searched
+  /// yet, with their probabilities.
+  using Look = std::function<void(std::vector<Judged> nothings, std::vector<Judged> judged)>;
+
   /// Sets the probabilities of all of `hypotheses`, which are about the candidates (objects of `events`, one at least).
-  /// kCancelled.
-  core::Status run(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses);
+  /// `look` may be empty. kCancelled.
+  core::Status run(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses,
+                   const Look& look = {});
 
   std::vector<Judged>& nothings() { return nothings_; }  ///< By candidate.
   std::vector<Judged>& judged() { return judged_; }      ///< All others.
@@ -47,13 +52,16 @@ class EventSearch {
   int evaluated() const { return evaluated_; }  ///< Instances.
 
  private:
-  core::Status search_all(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses);
+  core::Status search_all(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses,
+                          const Look& look);
   core::Status search_rivals();
-  core::Status narrow_intervals();
+  core::Status narrow_intervals(const Look& look);
+  void tell(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses, const Look& look);
   void search(Judged& judged, int runs, const std::function<bool()>& out_of_time);
   void evaluate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<double> log_likelihoods);
   void propose_from_other_touch(const Hypothesis& hypothesis, TemperedTarget& target) const;
   void note_evidence(Judged& judged, double log_evidence);
+  void leave_open(Judged& judged);
   TemperedTarget target_of(const Hypothesis& hypothesis);
   std::function<bool()> share_of_time(std::size_t searches) const;
   double evidence_of_nothing(std::size_t object) const;
@@ -71,6 +79,7 @@ class EventSearch {
   std::vector<OtherMotion> others_;  // by object; of the candidates
   double best_ = -1e300;             // greatest log prior + log evidence until now
   int evaluated_ = 0;
+  int told_at_ = 0;  // instances at the last look
   bool out_of_time_ = false;
 };
 

@@ -54,7 +54,14 @@ class Explainer {
     const std::vector<Hypothesis> hypotheses = hypotheses_about(candidates, *events_, query_.weights, *tools_.meshes);
     const QueryContext searching = context_of_search();
     EventSearch search(*events_, *likelihood_, times_, query_, searching);
-    PRESCENE_RETURN_IF_ERROR(search.run(candidates, hypotheses));
+    const auto tell = [&](std::vector<Judged> nothings, std::vector<Judged> judged_so_far) {
+      JudgedEvents known{window_, *events_, *likelihood_, times_, nothings, judged_so_far, chosen_};
+      ExplainAnswer so_far = explained_so_far(known);
+      so_far.evaluated = looked.evaluated() + search.evaluated();
+      context_.so_far(so_far);
+    };
+    PRESCENE_RETURN_IF_ERROR(
+        search.run(candidates, hypotheses, context_.so_far ? EventSearch::Look(tell) : EventSearch::Look()));
     PRESCENE_RETURN_IF_ERROR(events_->failure());
     JudgedEvents judged{window_, *events_, *likelihood_, times_, search.nothings(), search.judged(), chosen_};
     if (search.was_out_of_time()) judged.points = kPointsInHaste;

@@ -79,16 +79,11 @@ class AnswerBuilder {
         most_points_(events.points) {}
 
   ExplainAnswer answer() {
-    ExplainAnswer answer;
-    std::vector<const Judged*> all;
     for (Judged& nothing : nothings_) work_out(nothing);
-    for (Judged& judged : judged_) {
+    for (Judged& judged : judged_)
       if (judged.probability >= kLeastDetailed) work_out(judged);
-      all.push_back(&judged);
-    }
-    all.push_back(&nothings_.front());
-    std::stable_sort(all.begin(), all.end(),
-                     [](const Judged* a, const Judged* b) { return a->probability > b->probability; });
+    const std::vector<const Judged*> all = by_probability();
+    ExplainAnswer answer = counted();
     for (const Judged* judged : all) answer.explanations.push_back(explanation_of(*judged));
     std::vector<const Judged*> probable;
     for (const Judged* judged : all)
@@ -112,16 +107,38 @@ class AnswerBuilder {
       frame.against_second = known ? frame.against_nothing - frame_means(all[1], k) : 0.0;
       answer.frames.push_back(frame);
     }
-    answer.duration = events_->duration();
-    answer.simulated = events_->simulated();
-    answer.failed = events_->failed();
-    answer.stepper = events_->stepper();
     answer.remarks = events_->remarks();
     answer.text = paragraph_of(answer);
     return answer;
   }
 
+  ExplainAnswer so_far() const {
+    ExplainAnswer answer = counted();
+    for (const Judged* judged : by_probability()) answer.explanations.push_back(explanation_of(*judged));
+    answer.text = paragraph_of(answer);
+    return answer;
+  }
+
  private:
+  std::vector<const Judged*> by_probability() const {
+    std::vector<const Judged*> all;
+    for (const Judged& judged : judged_) all.push_back(&judged);
+    all.push_back(&nothings_.front());
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Judged* a, const Judged* b) { return a->probability > b->probability; });
+    return all;
+  }
+
+  /// Without explanations.
+  ExplainAnswer counted() const {
+    ExplainAnswer answer;
+    answer.duration = events_->duration();
+    answer.simulated = events_->simulated();
+    answer.failed = events_->failed();
+    answer.stepper = events_->stepper();
+    return answer;
+  }
+
   /// Nothing, from where the belief begins: what others are compared with.
   static bool is_reference(const Judged& judged) {
     return judged.hypothesis.kind == EventKind::kNothing && !judged.hypothesis.begins_otherwise;
@@ -323,5 +340,7 @@ class AnswerBuilder {
 }  // namespace
 
 ExplainAnswer explain_answer(JudgedEvents& events) { return AnswerBuilder(events).answer(); }
+
+ExplainAnswer explained_so_far(JudgedEvents& events) { return AnswerBuilder(events).so_far(); }
 
 }  // namespace prescene::queries

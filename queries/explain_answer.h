@@ -49,5 +49,7 @@ struct JudgedEvents {
 
 /// All but the numbers of evaluations before, and remarks of the search.
 ExplainAnswer explain_answer(JudgedEvents& events);
+/// Its explanations, text and counts as far as they take no further work.
+ExplainAnswer explained_so_far(JudgedEvents& events);
 
 }  // namespace prescene::queries

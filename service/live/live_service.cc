@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <exception>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "live_service_impl.h"
+#include "prescene/belief/json.h"
 #include "prescene/core/clock.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/recording/why_answer.h"
@@ -250,7 +252,23 @@ core::Result<queries::ExplainContext> LiveService::Impl::frames_context(const qu
 core::Result<nlohmann::ordered_json> LiveService::Impl::explain(const belief::ExplainQuestion& question,
                                                                 const queries::QueryContext& context) {
   PRESCENE_TRY(PastWindow past, frames.window(question));
-  PRESCENE_TRY(const queries::ExplainContext explain_context, frames_context(context));
+  PRESCENE_TRY(queries::ExplainContext explain_context, frames_context(context));
+  if (question.stream && !question.id.empty() && settings.worker.on_answer_so_far)
+    explain_context.so_far = [this, &question, known = not_explained_yet(past), watch = core::Stopwatch(),
+                              cpu = core::process_cpu_seconds(),
+                              told = std::optional<core::Stopwatch>()](const queries::ExplainAnswer& so_far) mutable {
+      if (told && told->seconds() < kSoFarInterval) return;
+      try {
+        known.answer = so_far;
+        known.seconds = watch.seconds();
+        known.cpu_seconds = core::process_cpu_seconds() - cpu;
+        nlohmann::ordered_json answer = explain_answer_json(question, known);
+        answer["final"] = false;
+        settings.worker.on_answer_so_far(belief::json_text(answer));
+      } catch (const std::exception&) {  // no reason to end the work
+      }
+      told.emplace();
+    };
   PRESCENE_TRY(const Explained explained,
                explain_past(std::move(past), question, settings.event_weights, explain_context));
   return explain_answer_json(question, explained);

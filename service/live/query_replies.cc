@@ -15,8 +15,6 @@ namespace {
 // s between the last simulated instance and the end of all work on a question, at most.
 constexpr double kRestSeconds = 1.5;
 constexpr double kProgressInterval = 0.2;  // s, at least, between two messages on how far the work is
-// s, at least, between two answers so far: what a reader with a history of ten answers can take from several questions.
-constexpr double kSoFarInterval = 0.05;
 
 }  // namespace
 

@@ -23,6 +23,7 @@ constexpr std::size_t kLongestQuestion = 1u << 20;
 // Where there is no room, the id is looked for in questions up to this length only: in longer ones it takes too long.
 constexpr std::size_t kLongestWithId = 4096;
 constexpr std::size_t kMostRefusalsWaiting = 256;
+
 /// Questions without limits of their own are bounded in time, so that a robot gets its answer.
 void bound_effort(belief::Query& query, double default_seconds, double most_seconds) {
   const auto bound = [=](belief::Effort& effort) {

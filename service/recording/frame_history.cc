@@ -224,6 +224,15 @@ std::size_t FrameHistory::bytes() const {
   return bytes_;
 }
 
+Explained not_explained_yet(const PastWindow& past) {
+  Explained explained;
+  explained.from = past.from;
+  explained.to = past.to;
+  if (!past.window.frames.empty()) explained.step = past.window.frames.back().belief->step;
+  explained.remarks = past.remarks;
+  return explained;
+}
+
 core::Result<Explained> explain_past(PastWindow past, const belief::ExplainQuestion& question,
                                      const belief::EventWeights& weights, const queries::ExplainContext& context) {
   queries::ExplainQuery query;
@@ -239,12 +248,9 @@ core::Result<Explained> explain_past(PastWindow past, const belief::ExplainQuest
   query.wanted = question.wanted;
   const core::Stopwatch watch;
   const double cpu = core::process_cpu_seconds();
-  Explained explained;
-  PRESCENE_TRY(explained.answer, queries::explain(past.window, query, context));
-  explained.from = past.from;
-  explained.to = past.to;
-  explained.step = past.window.frames.back().belief->step;
-  explained.remarks = std::move(past.remarks);
+  PRESCENE_TRY(queries::ExplainAnswer answer, queries::explain(past.window, query, context));
+  Explained explained = not_explained_yet(past);
+  explained.answer = std::move(answer);
   explained.seconds = watch.seconds();
   explained.cpu_seconds = core::process_cpu_seconds() - cpu;
   explained.window = std::move(past.window);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -221,15 +222,16 @@ class TrackedRecording {
     EXPECT_TRUE(replayed.ok()) << replayed.status().message();
   }
 
-  core::Result<Explained> explained(const belief::ExplainQuestion& question) {
+  using SoFar = std::function<void(const queries::ExplainAnswer&)>;
+  core::Result<Explained> explained(const belief::ExplainQuestion& question, const SoFar& so_far = {}) {
     PRESCENE_TRY(auto past, history_.window(question));
     PRESCENE_TRY(const auto likelihood, backends_.make_likelihood());
-    const queries::ExplainContext context{backends_.query_context(pool_), likelihood.get(), {}};
+    const queries::ExplainContext context{backends_.query_context(pool_), likelihood.get(), {}, so_far};
     return explain_past(std::move(past), question, {}, context);
   }
   /// The answer but for how long it took.
-  nlohmann::ordered_json answer(const belief::ExplainQuestion& question) {
-    const auto found = explained(question);
+  nlohmann::ordered_json answer(const belief::ExplainQuestion& question, const SoFar& so_far = {}) {
+    const auto found = explained(question, so_far);
     EXPECT_TRUE(found.ok()) << found.status().message();
     if (!found) return {};
     nlohmann::ordered_json answer = explain_answer_json(question, *found);
@@ -311,6 +313,68 @@ TEST(FrameHistory, ExplainsWithTheSameBitsOnAnyThreadsAndWhenAskedAgain) {
   EXPECT_FALSE(taken->answer.change);
   EXPECT_THAT(taken->answer.remarks,
               ::testing::Contains(HasSubstr("No smallest change is worked out of 'taken_away'")));
+}
+
+/// What is told on the way, each with its explanations as text.
+struct ToldOnTheWay {
+  std::vector<queries::ExplainAnswer> answers;
+  std::vector<std::string> texts;
+  nlohmann::ordered_json answer;
+};
+
+ToldOnTheWay told_by(TrackedRecording& recording, const belief::ExplainQuestion& question) {
+  ToldOnTheWay told;
+  told.answer = recording.answer(question, [&](const queries::ExplainAnswer& so_far) {
+    told.answers.push_back(so_far);
+    Explained known;
+    known.answer = so_far;
+    told.texts.push_back(belief::json_text(to_json(known)));
+  });
+  return told;
+}
+
+TEST(FrameHistory, TellsWhatIsKnownOfAnExplanationOnTheWay) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "box.mcap";
+  record_change(tests::box_on_table("1.6", ", normal: {position: [0.003, 0.003, 0]}"), {1.2, "box", std::nullopt},
+                path);
+  TrackedRecording on_one(path, 1), on_two(path, 2);
+  const belief::ExplainQuestion question = quick_question(0.8);
+  const ToldOnTheWay told = told_by(on_one, question), on_others = told_by(on_two, question);
+  EXPECT_EQ(told.texts, on_others.texts) << "does not depend on threads";
+  EXPECT_EQ(told.answer, on_others.answer);
+  EXPECT_EQ(told.answer, on_one.answer(question)) << "does not change the answer";
+
+  ASSERT_GE(told.answers.size(), 3u);
+  const auto& last = told.answers.back();
+  // Before the first, only what comes before all searches: where the box may be seen, and that nothing happened.
+  const int all = told.answer["explain"]["weighed_instances"];
+  EXPECT_LT(told.answers.front().evaluated, all);
+  const double found = told.answer["explain"]["explanations"][0]["probability"];
+  for (std::size_t i = 0; i < told.answers.size(); ++i) {
+    const queries::ExplainAnswer& known = told.answers[i];
+    if (i > 0) {
+      EXPECT_GT(known.evaluated, told.answers[i - 1].evaluated);
+    }
+    ASSERT_EQ(known.explanations.size(), last.explanations.size()) << "those that were not searched yet, too";
+    double sum = 0.0;
+    for (const queries::Explanation& e : known.explanations) {
+      sum += e.probability;
+      EXPECT_LE(e.low, e.probability) << e.sentence;
+      EXPECT_GE(e.high, e.probability) << e.sentence;
+      EXPECT_FALSE(e.time) << "takes more work";
+      if (e.kind != belief::EventKind::kTakenAway) continue;
+      EXPECT_LE(e.low, found) << "after " << known.evaluated;
+      EXPECT_GE(e.high, found) << "after " << known.evaluated;
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-9);
+    EXPECT_FALSE(known.text.empty());
+  }
+  // That something happened is known before it is known what.
+  for (const queries::Explanation& e : told.answers.front().explanations)
+    if (e.kind == belief::EventKind::kNothing && !e.present_at_start) {
+      EXPECT_LT(e.high, 0.5);
+    }
 }
 
 TEST(FrameHistory, GivesAsMuchOfAWindowThatNobodyAskedForAsItHas) {

@@ -39,7 +39,7 @@ struct ExplainQuestion {
   std::string wanted_name;
   std::optional<Outcome> wanted;
   std::optional<double> max_seconds;  ///< Wall time; empty: as much as whoever answers gives.
-  bool stream = false;                ///< As belief::Query::stream; there is nothing to tell before the answer.
+  bool stream = false;                ///< As belief::Query::stream.
   friend bool operator==(const ExplainQuestion&, const ExplainQuestion&) = default;
 };
 

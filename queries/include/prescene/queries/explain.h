@@ -11,6 +11,7 @@
 // times prior its probability. docs/reference/explain.md says what is assumed.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -62,12 +63,6 @@ struct ExplainQuery {
 };
 /// kInvalidInput naming what is out of range.
 core::Status validate(const ExplainQuery& query);
-
-struct ExplainContext {
-  QueryContext simulation;  ///< Needs make_simulator, make_renderer, pool and meshes.
-  rendering::LikelihoodBatch* likelihood = nullptr;
-  filter::FilterSettings settings;  ///< Of the tracker: colours, sensor, tempering.
-};
 
 /// A parameter of an event under the posterior.
 struct EventValue {
@@ -155,6 +150,16 @@ struct ExplainAnswer {
   int evaluated = 0;      ///< Instances that were weighed.
   int failed = 0;         ///< That became unstable, or were impossible.
   std::string stepper;
+};
+
+struct ExplainContext {
+  QueryContext simulation;  ///< Needs make_simulator, make_renderer, pool and meshes.
+  rendering::LikelihoodBatch* likelihood = nullptr;
+  filter::FilterSettings settings;  ///< Of the tracker: colours, sensor, tempering.
+  /// Told what is known so far, from the thread that works; may be empty. Has the explanations without the parameters
+  /// of their events, the text and the counts. What was not searched yet has an interval of all that it may be. Does
+  /// not change the answer.
+  std::function<void(const ExplainAnswer& so_far)> so_far = {};
 };
 
 /// kInvalidInput for a query out of range, a wanted outcome that can't be, and a window without frames, kNotFound for

@@ -34,6 +34,10 @@
 
 namespace prescene::service {
 
+/// s, at least, between two answers so far to a question: what a reader with a history of ten answers can take of
+/// several questions.
+inline constexpr double kSoFarInterval = 0.05;
+
 struct QueryWorkerSettings {
   /// Questions that wait to be simulated; more are answered with an error that names the bound.
   FairLimits waiting = {16, 64, std::size_t{16} << 20};

@@ -114,6 +114,8 @@ class FrameHistory {
 queries::WindowFrame sampled_frame(const belief::Observation& observation, std::shared_ptr<const belief::Belief> belief,
                                    int width);
 
+/// The window of a question, whose answer so far is still to be filled in.
+Explained not_explained_yet(const PastWindow& past);
 /// Answers the question; `past` is its window.
 core::Result<Explained> explain_past(PastWindow past, const belief::ExplainQuestion& question,
                                      const belief::EventWeights& weights, const queries::ExplainContext& context);
