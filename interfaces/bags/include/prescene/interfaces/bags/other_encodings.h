@@ -3,9 +3,8 @@
 // in one sentence.
 //
 //   OtherEncodings others;
-//   for (const McapChannel& channel : reader->channels())
-//     if (others.note(channel.topic, channel.message_encoding)) continue;
-//   others.text();   // "1 messages that are not in CDR were left out: '/status' ('json')"
+//   if (others.note("/status", "json")) ...   // leave the message out
+//   const std::string said = others.text();   // "1 messages that are not in CDR were left out: '/status' ('json')"
 #pragma once
 
 #include <cstdint>
