@@ -345,7 +345,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
     islands = join_islands(belief, dt, result.counters);
     PredictReport report = predict(belief, control, X_WG, dt, settings_.predict, simulators_,
                                    core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads(),
-                                   islands, seen_by_others(belief, observation.camera));
+                                   islands, seen_by_others(belief, observation.camera), &robot_bounds_);
     result.counters.pushed_particles = report.pushed;
     result.counters.simulated = report.simulated;
     result.counters.not_simulated = report.not_simulated;

@@ -161,7 +161,6 @@ void end_pushes(double dt, belief::Belief& belief) {
   });
 }
 
-/// A box about the shapes, the smallest one but for meshes that are turned in their body.
 geometry::Box bounds_of(const std::vector<belief::CollisionShape>& shapes) {
   geometry::Box box;
   for (const belief::CollisionShape& shape : shapes) {
@@ -177,7 +176,7 @@ geometry::Box bounds_of(const std::vector<belief::CollisionShape>& shapes) {
 }
 
 /// What is known to move in this step: pushes, and bodies of the robot.
-std::vector<Mover> movers_of(const belief::Belief& belief, std::span<const Pose> X_WG, double dt) {
+std::vector<Mover> movers_of(const belief::Belief& belief, std::span<const Pose> X_WG, double dt, RobotBounds& bounds) {
   std::vector<Mover> movers;
   for (const belief::Action& action : belief.pushes) {
     const auto& push = std::get<belief::Push>(action.what);
@@ -187,7 +186,7 @@ std::vector<Mover> movers_of(const belief::Belief& belief, std::span<const Pose>
   }
   for (std::size_t i = 0; i < X_WG.size(); ++i) {
     if (stands_still(belief.robot[i], X_WG[i])) continue;
-    const geometry::Box box = bounds_of(belief.scene->robot[i].collision);
+    const geometry::Box& box = bounds.of(i, belief.scene->robot[i].collision);
     if (box.isEmpty()) continue;
     // Within the step its corners go no further than from one end to the other.
     double way = 0.0;
@@ -251,6 +250,13 @@ void change_modes(const PredictOptions& options, bool seen, bool tracked, bool i
 
 }  // namespace
 
+const geometry::Box& RobotBounds::of(std::size_t body, const std::vector<belief::CollisionShape>& shapes) {
+  if (body >= known_.size()) known_.resize(body + 1);
+  Known& known = known_[body];
+  if (known.shapes != shapes) known = {shapes, bounds_of(shapes)};
+  return known.box;
+}
+
 std::optional<int> holder_of(const belief::Scene& scene, int object) {
   const auto& held_by = scene.objects[static_cast<std::size_t>(object)].held_by;
   return held_by ? belief::find_robot_body(scene, *held_by) : std::nullopt;
@@ -284,13 +290,14 @@ void drift(Particle& particle, const Vector3d& p_OQ, double dt, double velocity_
 PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
                       const PredictOptions& options, const simulation::SimulatorFactory& simulators,
                       const core::RandomStream& stream, core::ThreadPool& threads, std::span<const Island> islands,
-                      const std::vector<bool>& keeps_modes) {
+                      const std::vector<bool>& keeps_modes, RobotBounds* robot_bounds) {
   PRESCENE_CHECK(belief.objects.size() == belief.scene->objects.size());
   PRESCENE_CHECK(X_WG.size() == belief.scene->robot.size() && belief.robot.size() == X_WG.size());
   PRESCENE_CHECK(dt > 0.0);
   apply_grasps(control, belief);
   begin_pushes(control, dt, belief);
-  const std::vector<Mover> movers = movers_of(belief, X_WG, dt);
+  RobotBounds of_this_step;
+  const std::vector<Mover> movers = movers_of(belief, X_WG, dt, robot_bounds != nullptr ? *robot_bounds : of_this_step);
 
   Worlds worlds = worlds_of(belief, islands);
   std::vector<Falling> falling;

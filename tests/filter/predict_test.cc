@@ -48,6 +48,22 @@ belief::Belief hand_and_object(MotionMode mode, bool held) {
   return belief;
 }
 
+TEST(RobotBounds, AreThoseOfTheShapesThatABodyHasNow) {
+  const auto box = [](double half, const Vector3d& at) {
+    return belief::PrimitiveShape{geometry::BoxShape{Vector3d::Constant(2.0 * half)}, Pose::from_translation(at)};
+  };
+  RobotBounds bounds;
+  EXPECT_TRUE(bounds.of(3, {}).isEmpty());
+  for (const double half : {0.1, 0.1, 0.2}) {
+    const geometry::Box& one = bounds.of(0, {box(half, {1.0, 0.0, 0.0}), box(half, {0.0, 0.0, 2.0})});
+    EXPECT_LT((one.min() - Vector3d::Constant(-half)).norm(), 1e-12);
+    EXPECT_LT((one.max() - Vector3d(1.0 + half, half, 2.0 + half)).norm(), 1e-12);
+  }
+  EXPECT_LT((bounds.of(1, {box(0.3, Vector3d::Zero())}).max() - Vector3d::Constant(0.3)).norm(), 1e-12);
+  EXPECT_LT((bounds.of(0, {box(0.3, Vector3d::Zero())}).min() + Vector3d::Constant(0.3)).norm(), 1e-12);
+  EXPECT_TRUE(bounds.of(3, {}).isEmpty());
+}
+
 PredictOptions without_mode_changes() {
   PredictOptions options;
   options.wake_probability = 0.0;

@@ -188,6 +188,7 @@ class ParticleFilter {
   PoseSearch search_;
   WatchedRenderer renderer_;
   FilterTools tools_;
+  RobotBounds robot_bounds_;
   std::vector<FrameCache> frame_caches_;  // by camera
   /// Whether the camera was sharp when that was last measured, so that turns are looked at in its fine image.
   bool is_sharp(int camera) const { return smears_[static_cast<std::size_t>(camera)].is_sharp(); }

@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "prescene/belief/belief.h"
 #include "prescene/belief/observation.h"
@@ -73,6 +74,21 @@ struct PredictReport {
   std::string failure;
 };
 
+/// Boxes about the collision shapes of a scene's robot bodies. They are fixed in the bodies, so that each is worked out
+/// once, and again only where a body's shapes are others. Not thread-safe.
+class RobotBounds {
+ public:
+  /// The smallest box but for meshes that are turned in their body; empty where there are no shapes. `body`: its index.
+  const geometry::Box& of(std::size_t body, const std::vector<belief::CollisionShape>& shapes);
+
+ private:
+  struct Known {
+    std::vector<belief::CollisionShape> shapes;
+    geometry::Box box;
+  };
+  std::vector<Known> known_;
+};
+
 /// Steps `belief` from its robot poses and stamp to `X_WG` and `dt` later (s, > 0). Actions of the control act at their
 /// times within the step. Weights change with modes.
 ///
@@ -86,10 +102,12 @@ struct PredictReport {
 /// released each is for itself.
 ///
 /// `keeps_modes`: by object; those of which nothing new is seen, so that whatever their particles do they go on doing.
+///
+/// `robot_bounds`: kept from step to step; null = worked out in this one. The result is the same.
 PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
                       const PredictOptions& options, const simulation::SimulatorFactory& simulators,
                       const core::RandomStream& stream, core::ThreadPool& threads, std::span<const Island> islands = {},
-                      const std::vector<bool>& keeps_modes = {});
+                      const std::vector<bool>& keeps_modes = {}, RobotBounds* robot_bounds = nullptr);
 
 /// One particle at constant velocity about the centre p_OQ for dt, its covariance grown by the noise.
 void drift(belief::Particle& particle, const Vector3d& p_OQ, double dt, double velocity_keep, const MotionNoise& noise);
