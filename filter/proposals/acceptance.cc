@@ -294,28 +294,11 @@ void settle_in_fine(const rendering::FrameTerms& terms, const Vector3d& up_C, st
 std::vector<Detection> take_back_in_fine(const Surroundings& surroundings, std::span<const WantedModel> wanted,
                                          const DetectionOptions& options, const LeastOfFind& least,
                                          std::vector<int>& left, std::vector<Detection>& found) {
-  std::vector<Detection> taken;
-  for (std::size_t i = found.size(); i-- > 0;) {
-    std::vector<Detection> others = found;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-    const SupportSurfaces things = surfaces_of(others, wanted, surroundings.X_WC);
-    const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
-    Detection& detection = found[i];
-    const auto model = static_cast<std::size_t>(detection.model);
-    const Pose X_WO = surroundings.X_WC * detection.X_CO;
-    detection.stands = stands(wanted[model].target, X_WO, surroundings.up_W, ground, kUnderIt);
-    FineProposal proposal;
-    proposal.model = detection.model;
-    proposal.candidate = {detection.X_CO, detection.evidence};
-    proposal.weigh(detection.stands);
-    if (acceptable_in_fine(detection.evidence, proposal.cost, options) && detection.outline >= least.outline &&
-        detection.probability >= least.probability)
-      continue;
-    ++left[model];
-    taken.push_back(detection);
-    found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
-  }
-  return taken;
+  const auto stays = [&](std::size_t i, double cost) {
+    return acceptable_in_fine(found[i].evidence, cost, options) && found[i].outline >= least.outline &&
+           found[i].probability >= least.probability;
+  };
+  return take_back_unless<FineProposal>(stays, kUnderIt, surroundings, wanted, left, found);
 }
 
 }  // namespace prescene::filter

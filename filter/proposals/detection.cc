@@ -201,25 +201,12 @@ std::vector<double> believe(const rendering::FrameTerms& terms, const std::vecto
 void take_back(const Surroundings& surroundings, std::span<const WantedModel> wanted, const ProposalJudge& judge,
                const DetectionOptions& options, std::span<const double> log_odds, std::vector<int>& left,
                std::vector<Detection>& found) {
-  for (std::size_t i = found.size(); i-- > 0;) {
-    std::vector<Detection> others = found;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-    const SupportSurfaces things = surfaces_of(others, wanted, surroundings.X_WC);
-    const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
-    Detection& detection = found[i];
-    const auto model = static_cast<std::size_t>(detection.model);
-    const Pose X_WO = surroundings.X_WC * detection.X_CO;
-    detection.stands = stands(wanted[model].target, X_WO, surroundings.up_W, ground, kAtCorners);
-    Proposal proposal;
-    proposal.model = detection.model;
-    proposal.candidate = {detection.X_CO, detection.evidence};
-    proposal.weigh(detection.stands);
-    if (judge.decides() ? !hopeless(detection.evidence) && judge.believes(log_odds[i])
-                        : acceptable(detection.evidence, proposal.cost, options) && detection.outline >= kLeastOutline)
-      continue;
-    ++left[model];
-    found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
-  }
+  const auto stays = [&](std::size_t i, double cost) {
+    const Detection& detection = found[i];
+    return judge.decides() ? !hopeless(detection.evidence) && judge.believes(log_odds[i])
+                           : acceptable(detection.evidence, cost, options) && detection.outline >= kLeastOutline;
+  };
+  take_back_unless<Proposal>(stays, kAtCorners, surroundings, wanted, left, found);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 // (fine_detection.cc) have in common.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -52,6 +54,34 @@ std::vector<SearchedModel> search_clusters(const rendering::FrameTerms& terms, s
 SupportSurfaces surfaces_of(std::span<const Detection> found, std::span<const WantedModel> wanted, const Pose& X_WC);
 std::vector<geometry::DepthImage> depths_of(std::span<const Detection> found, std::span<const WantedModel> wanted,
                                             const geometry::PinholeCamera& camera, const FilterTools& tools);
+/// Looks, the newest find first, whether each stands on something now that the others are where they are, and takes it
+/// back unless `stays(index, cost)` holds; `cost` is that of a proposal of the kind Proposed which stands so. Returns
+/// what was taken back.
+template <class Proposed, class Stays>
+std::vector<Detection> take_back_unless(const Stays& stays, std::span<const double> shares,
+                                        const Surroundings& surroundings, std::span<const WantedModel> wanted,
+                                        std::vector<int>& left, std::vector<Detection>& found) {
+  std::vector<Detection> taken;
+  for (std::size_t i = found.size(); i-- > 0;) {
+    std::vector<Detection> others = found;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    const SupportSurfaces things = surfaces_of(others, wanted, surroundings.X_WC);
+    const std::array<const SupportSurfaces*, 3> ground = {&surroundings.solid, &surroundings.steps, &things};
+    Detection& detection = found[i];
+    const auto model = static_cast<std::size_t>(detection.model);
+    const Pose X_WO = surroundings.X_WC * detection.X_CO;
+    detection.stands = filter::stands(wanted[model].target, X_WO, surroundings.up_W, ground, shares);
+    Proposed proposal;
+    proposal.model = detection.model;
+    proposal.candidate = {detection.X_CO, detection.evidence};
+    proposal.weigh(detection.stands);
+    if (stays(i, proposal.cost)) continue;
+    ++left[model];
+    taken.push_back(detection);
+    found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  return taken;
+}
 /// What is over the main support first, then over others; of the rest only some.
 std::vector<Cluster> clusters_over_supports(const SampledDepth& sampled, const geometry::Image<std::uint8_t>& explained,
                                             const Surroundings& surroundings, const DetectionOptions& options);
