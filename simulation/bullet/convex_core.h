@@ -55,6 +55,8 @@ class ConvexCore : public btConvexInternalShape {
   /// The feature of the core that faces `direction` (unit, S): the best aligned face of a polytope, the cap or the side
   /// line of a cylinder or cone, the segment of a capsule, the point of a sphere.
   void facing(const Vector3d& direction, Feature& feature) const;
+  /// Of a cylinder: the radius of its rims and z of the upper and the lower one. Else nothing.
+  const Vector3d* rims() const { return kind_ == Kind::kCylinder ? &half_ : nullptr; }
   /// Where the core is nearest to a point.
   struct Nearest {
     double distance = 0.0;                ///< m; negative inside of the core.

@@ -12,24 +12,46 @@ namespace prescene::simulation {
 void InstanceWorld::set_part(int parts) { part_ = dt() * (static_cast<double>(parts) / kStepParts); }
 
 int InstanceWorld::splits_allowed() const {
-  // Joints are aimed at the end of a whole step, and hands do what the whole step takes.
+  // Joints are aimed at the end of a whole step, and forces of hands do what the whole step takes.
   if (!scene_->joints.empty() || any_loaded_) return 0;
   int moving = 0;
-  for (std::size_t i = 0; i < moving_.size(); ++i) {
-    const Moving& m = moving_[i];
-    if (i < objects_.size() && objects_[i].held) return 0;
-    if (m.present && !m.dynamic && m.travel > 0.0) return 0;
-    moving += m.present && m.dynamic ? 1 : 0;
-  }
+  for (const Moving& m : moving_) moving += m.present && m.dynamic ? 1 : 0;
   return most_splits(moving);
 }
 
-/// How many of the parts that are left come before the next impact.
+/// How long until the contact has gone on along a rim that one of the two leans on.
+double InstanceWorld::rim_time(const SolverContact& c) const {
+  double first = std::numeric_limits<double>::infinity();
+  const double touching = scene_->options.touching_distance;
+  if (c.gap > touching) return first;
+  const Vector3d spin =
+      moving_[static_cast<std::size_t>(c.body_a)].spin_before - moving_[static_cast<std::size_t>(c.body_b)].spin_before;
+  for (const double side : {1.0, -1.0}) {
+    const int body = side > 0.0 ? c.body_a : c.body_b;
+    if (body >= scene_->object_count) continue;
+    const Vector3d normal = side * c.normal;
+    const Vector3d own = c.position + 0.5 * c.gap * normal;
+    for (const Part& part : compiled(body).parts) {
+      if (!part.core || !part.core->rims()) continue;
+      const Frame X_WS = moving_[static_cast<std::size_t>(body)].X_WO * part.X_OS;
+      const Vector3d& rims = *part.core->rims();
+      const LeaningRim rim{X_WS.R.col(2), normal, side * spin};
+      if (!leans(rim)) continue;
+      const double z = rim.axis.dot(normal) > 0.0 ? rims.z() : rims.y();
+      const Vector3d lowest = X_WS.p + z * rim.axis + rims.x() * lowest_of(rim) - part.core->radius() * normal;
+      if ((own - lowest).norm() <= touching) first = std::min(first, roll_time(rim));
+    }
+  }
+  return first;
+}
+
+/// How many of the parts that are left come before the next impact, or before a rim has rolled on.
 int InstanceWorld::parts_to_impact(int left) const {
   double first = std::numeric_limits<double>::infinity();
   for (const SolverContact& c : contacts_) {
     const Approach approach{c.gap, c.speed_before, free_acceleration(c), compiled(c.body_a).radius};
     first = std::min(first, split_time(approach, scene_->options));
+    first = std::min(first, rim_time(c));
   }
   return parts_until(first, dt(), left);
 }
@@ -45,6 +67,19 @@ void InstanceWorld::shorten(int parts) {
     c.gap -= 0.5 * before * c.turning * (1.0 - ratio * ratio);
     c.speed_before -= c.turning * (1.0 - ratio);
     c.turning *= ratio;
+  }
+}
+
+/// What hands move, `parts` of the step on.
+void InstanceWorld::lead_kinematic(int parts) {
+  const double time = dt() * (static_cast<double>(parts) / kStepParts);
+  for (std::size_t i = 0; i < moving_.size(); ++i) {
+    Moving& m = moving_[i];
+    if (!m.present || m.dynamic || m.travel == 0.0) continue;
+    m.X_WO.p += time * m.velocity;
+    m.X_WO.R = geometry::exp_rotation(time * m.spin).toRotationMatrix() * m.X_WO.R;
+    m.p_WCm = m.X_WO.p;
+    sweep(static_cast<int>(i));
   }
 }
 
@@ -77,6 +112,7 @@ bool InstanceWorld::take_parts(const core::Cancellation* cancellation) {
     if (left == 0) break;
     keep_pressed();
     set_part(left);
+    lead_kinematic(taken);
     place_dynamic();
     if (!find_contacts(cancellation)) return false;
   }

@@ -230,8 +230,10 @@ class InstanceWorld {
   void set_part(int parts);
   double share() const { return part_ / dt(); }
   int splits_allowed() const;
+  double rim_time(const SolverContact& contact) const;
   int parts_to_impact(int left) const;
   void shorten(int parts);
+  void lead_kinematic(int parts);
   void keep_pressed();
   void give_back_pressed();
   void note_overlap();

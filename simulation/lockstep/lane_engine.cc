@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "prescene/simulation/rules/impact_split.h"
+
 namespace prescene::simulation {
 namespace {
 
@@ -20,6 +22,13 @@ void set_rotation(const Rows<4>& rows, int at, const Quaterniond& q) {
   rows[3][at] = static_cast<Real>(q.z());
 }
 
+/// After so many parts of a step in which it goes straight and turns evenly.
+Pose pose_after(const Pose& X_now, const Pose& X_next, int parts) {
+  if (parts == 0) return X_now;
+  if (parts == kStepParts) return X_next;
+  return geometry::interpolate(X_now, X_next, static_cast<double>(parts) / kStepParts);
+}
+
 template <std::size_t N>
 void copy(const Rows<N>& rows, int from, int to) {
   for (Real* row : rows) row[to] = row[from];
@@ -34,6 +43,8 @@ LaneEngine::LaneEngine(std::shared_ptr<const CompiledLockstep> scene, int slots)
   const auto of_objects = most * static_cast<std::size_t>(lanes.objects);
   moved_.resize(of_objects);
   present_.resize(most * lanes.bodies.size() - of_objects);
+  driven_.resize(most);
+  ways_.resize(most * lanes.bodies.size());
   if (lanes.objects > 1) {
     footing_counts_.resize(of_objects);
     footings_.resize(of_objects * kMostFooting);
@@ -84,6 +95,7 @@ void LaneEngine::reset(int slot, const belief::WorldState& start) {
     set_motion(slot, object, LaneMotion::kFree);
   }
   for (int body = objects(); body < static_cast<int>(scene_->lanes.bodies.size()); ++body) remove(slot, body);
+  drive(slot, false);
 }
 
 Vector3d LaneEngine::center_of_mass(int slot, int object) const { return vector_at(state_.p, state_.at(object, slot)); }
@@ -109,6 +121,7 @@ void LaneEngine::read(int slot, int object, belief::ObjectState& state) const {
 }
 
 void LaneEngine::move(int from, int to) {
+  driven_[static_cast<std::size_t>(to)] = driven_[static_cast<std::size_t>(from)];
   for (int body = 0; body < static_cast<int>(scene_->lanes.bodies.size()); ++body) {
     const int a = state_.at(body, from);
     const int b = state_.at(body, to);
@@ -202,19 +215,39 @@ void LaneEngine::set_motion(int slot, int object, LaneMotion motion) {
 }
 
 void LaneEngine::hold(int slot, int object, const Pose& X_now, const Pose& X_next) {
+  set_motion(slot, object, LaneMotion::kHeld);
+  ways_[place_of(object, slot)] = {X_now, X_next};
+  lead_held(slot, object, 0, kStepParts);
+}
+
+/// From where to where it is led in these parts of the step.
+void LaneEngine::lead_held(int slot, int object, int from, int to) {
   const int at = state_.at(object, slot);
   const double dt = scene_->options.step;
-  set_motion(slot, object, LaneMotion::kHeld);
-  set_pose(slot, object, X_next);
+  const auto& [X_now, X_next] = ways_[static_cast<std::size_t>(at)];
+  set_pose(slot, object, pose_after(X_now, X_next, to));
   Moved& moved = moved_[static_cast<std::size_t>(at)];
   for (std::size_t i = 0; i < 3; ++i) moved.next_p[i] = state_.p[i][at];
   for (std::size_t i = 0; i < 4; ++i) moved.next_q[i] = state_.q[i][at];
-  set_pose(slot, object, X_now);
+  const Pose X_WO = pose_after(X_now, X_next, from);
+  set_pose(slot, object, X_WO);
   const Vector3d spin = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt;
-  const Quaterniond R_WP = X_now.rotation * scene_->R_OP[static_cast<std::size_t>(object)];
+  const Quaterniond R_WP = X_WO.rotation * scene_->R_OP[static_cast<std::size_t>(object)];
   const Vector3d arm = R_WP * vector_at(state_.com, at);
   set_vector(state_.v, at, (X_next.translation - X_now.translation) / dt + spin.cross(arm));
   set_vector(state_.w, at, spin);
+}
+
+/// What hands move, for these parts of the step.
+void LaneEngine::lead(int slot, int from, int to) {
+  for (int object = 0; object < objects(); ++object)
+    if (motion(slot, object) == LaneMotion::kHeld) lead_held(slot, object, from, to);
+  for (int body = objects(); body < static_cast<int>(scene_->lanes.bodies.size()); ++body) {
+    const int at = state_.at(body, slot);
+    if (present_[kinematic_of(body, slot)] == 0 || !(state_.travel[at] > 0)) continue;
+    const auto& [X_now, X_next] = ways_[static_cast<std::size_t>(at)];
+    set_place(slot, body, pose_after(X_now, X_next, from));
+  }
 }
 
 void LaneEngine::arrive(int slot, int object) {
@@ -264,13 +297,19 @@ void LaneEngine::freeze(int slot, int object) {
   set_motion(slot, object, LaneMotion::kFrozen);
 }
 
+void LaneEngine::set_place(int slot, int body, const Pose& X_WB) {
+  const int at = state_.at(body, slot);
+  const auto& origin = scene_->lanes.origin;
+  set_vector(state_.p, at, X_WB.translation - Vector3d(origin[0], origin[1], origin[2]));
+  const geometry::Matrix3d R = X_WB.rotation.toRotationMatrix();
+  for (int i = 0; i < 9; ++i) state_.R[static_cast<std::size_t>(i)][at] = static_cast<Real>(R(i / 3, i % 3));
+}
+
 void LaneEngine::place(int slot, int body, const Pose& X_now, const Pose& X_next) {
   const int at = state_.at(body, slot);
   const double dt = scene_->options.step;
-  const auto& origin = scene_->lanes.origin;
-  set_vector(state_.p, at, X_now.translation - Vector3d(origin[0], origin[1], origin[2]));
-  const geometry::Matrix3d R = X_now.rotation.toRotationMatrix();
-  for (int i = 0; i < 9; ++i) state_.R[static_cast<std::size_t>(i)][at] = static_cast<Real>(R(i / 3, i % 3));
+  ways_[static_cast<std::size_t>(at)] = {X_now, X_next};
+  set_place(slot, body, X_now);
   const Vector3d velocity = (X_next.translation - X_now.translation) / dt;
   const Vector3d spin = geometry::log_rotation(X_next.rotation * X_now.rotation.conjugate()) / dt;
   set_vector(state_.v, at, velocity);

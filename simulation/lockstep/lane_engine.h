@@ -77,14 +77,16 @@ class LaneEngine {
   /// Where a kinematic body (of lanes.bodies) is in the next step.
   void place(int slot, int body, const geometry::Pose& X_now, const geometry::Pose& X_next);
   void remove(int slot, int body) { present_[kinematic_of(body, slot)] = 0; }
+  /// Whether a hand's force acts in the next step, which is not split then: it does what the whole step takes.
+  void drive(int slot, bool driven) { driven_[static_cast<std::size_t>(slot)] = driven ? 1 : 0; }
 
   /// Flies slots [0, wanted.size()) and finds the contacts of those with wanted[slot] != 0.
   void find_contacts(std::span<const std::uint8_t> wanted);
   /// Ends the step of those with wanted[slot] != 0: impulses and poses. After find_contacts.
   ///
-  /// Where something hits fast, the step is split (lane_impacts.cc): it goes on to the impact, takes that by itself,
-  /// and searches again for contacts for what is left. Contacts that pressed in a part of the step are then among
-  /// contacts().
+  /// Where something hits fast or a rim rolls fast, the step is split (lane_impacts.cc): it goes on to the impact,
+  /// takes that by itself, and searches again for contacts for what is left. Contacts that pressed in a part of the
+  /// step are then among contacts().
   void advance(std::span<const std::uint8_t> wanted);
 
   // Of an object after a step.
@@ -121,6 +123,11 @@ class LaneEngine {
     Real next_p[3] = {}, next_q[4] = {};
   };
 
+  /// Of a step, of what hands move.
+  struct Way {
+    geometry::Pose X_now, X_next;
+  };
+
   std::size_t place_of(int object, int slot) const { return static_cast<std::size_t>(state_.at(object, slot)); }
   std::size_t kinematic_of(int body, int slot) const {
     return static_cast<std::size_t>(state_.at(body - objects(), slot));
@@ -131,6 +138,8 @@ class LaneEngine {
             static_cast<std::size_t>(state_.contact_count[place_of(object, slot)])};
   }
   void set_pose(int slot, int object, const geometry::Pose& X_WO);
+  void set_place(int slot, int body, const geometry::Pose& X_WB);
+  void lead_held(int slot, int object, int from, int to);
   void set_motion(int slot, int object, LaneMotion motion);
   void guide(std::span<const std::uint8_t> wanted);
   void fly_all(std::span<const std::uint8_t> wanted);
@@ -144,7 +153,9 @@ class LaneEngine {
   void restore_footing(std::size_t place, const ObjectSlot& in);
   void end_part(std::span<const std::uint8_t> wanted);
   // Split steps: lane_impacts.cc.
-  bool may_split(int slot) const;
+  void lead(int slot, int from, int to);
+  Vector3d velocity_at(int slot, int body, const Vector3d& point) const;
+  double rim_time(int slot, int body, const Vector3d& own, const Vector3d& normal, const Vector3d& spin) const;
   int parts_to_impact(int slot, int left);
   void split(std::span<const std::uint8_t> wanted);
   void shorten_contacts(int slot, int left);
@@ -161,6 +172,8 @@ class LaneEngine {
   LaneState state_;
   std::vector<Moved> moved_;           // by object
   std::vector<std::uint8_t> present_;  // of kinematic bodies
+  std::vector<std::uint8_t> driven_;   // by slot
+  std::vector<Way> ways_;              // by body, of what is kinematic in this step
   std::vector<int> footing_counts_;    // by object, of several
   std::vector<LaneContact> footings_;  // kMostFooting by object
   std::vector<std::uint8_t> woken_;

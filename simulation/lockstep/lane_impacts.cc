@@ -15,15 +15,34 @@ Vector3d vector_of(const Real (&v)[3]) {
 
 }  // namespace
 
-bool LaneEngine::may_split(int slot) const {
-  for (int object = 0; object < objects(); ++object)
-    if (motion(slot, object) == LaneMotion::kHeld) return false;
-  for (int body = objects(); body < static_cast<int>(scene_->lanes.bodies.size()); ++body)
-    if (present_[kinematic_of(body, slot)] != 0 && state_.travel[state_.at(body, slot)] > 0) return false;
-  return true;
+/// Of a body at a point, W from the local origin.
+Vector3d LaneEngine::velocity_at(int slot, int body, const Vector3d& point) const {
+  const int at = state_.at(body, slot);
+  return vector_at(state_.v, at) + vector_at(state_.w, at).cross(point - vector_at(state_.p, at));
 }
 
-/// How many of the parts that are left come before the next impact.
+/// How long until a contact has gone on along a rim that a body leans on. The body touches at `own` (W from the local
+/// origin), `normal` points to it and `spin` is as the other body sees it.
+double LaneEngine::rim_time(int slot, int body, const Vector3d& own, const Vector3d& normal,
+                            const Vector3d& spin) const {
+  double first = std::numeric_limits<double>::infinity();
+  for (const ConvexPart& part : scene_->lanes.bodies[static_cast<std::size_t>(body)].parts) {
+    if (part.kind != CoreKind::kCylinder) continue;
+    const int at = state_.at(body, slot);
+    const geometry::Matrix3d R = rotation(slot, body).toRotationMatrix();
+    const Vector3d axis_P(part.R_PS[2], part.R_PS[5], part.R_PS[8]);
+    const LeaningRim rim{R * axis_P, normal, spin};
+    if (!leans(rim)) continue;
+    const Vector3d middle_P = Vector3d(part.center.data()) - vector_at(state_.com, at);
+    const double z = rim.axis.dot(normal) > 0.0 ? -part.half[2] : part.half[2];
+    const Vector3d lowest =
+        vector_at(state_.p, at) + R * middle_P + z * rim.axis + part.half[0] * lowest_of(rim) - part.radius * normal;
+    if ((own - lowest).norm() <= scene_->options.touching_distance) first = std::min(first, roll_time(rim));
+  }
+  return first;
+}
+
+/// How many of the parts that are left come before the next impact, or before a rim has rolled on.
 int LaneEngine::parts_to_impact(int slot, int left) {
   const StepSettings& settings = scene_->lanes.settings;
   const Vector3d gravity(settings.gravity[0], settings.gravity[1], settings.gravity[2]);
@@ -34,6 +53,7 @@ int LaneEngine::parts_to_impact(int slot, int left) {
     if (contacts.empty()) continue;
     const geometry::Matrix3d R = rotation(slot, object).toRotationMatrix();
     const Vector3d v = vector_at(state_.v, at), w = vector_at(state_.w, at);
+    const bool falls = motion(slot, object) != LaneMotion::kHeld;
     const double reach = scene_->lanes.bodies[static_cast<std::size_t>(object)].radius;
     for (const LaneContact& c : contacts) {
       const Vector3d normal = R * vector_of(c.normal);
@@ -41,13 +61,20 @@ int LaneEngine::parts_to_impact(int slot, int left) {
       double speed = normal.dot(v + w.cross(arm)) + static_cast<double>(c.turning);
       double acceleration = normal.dot(gravity);
       const int other = scene_->lanes.parts[static_cast<std::size_t>(c.part)].body;
-      if (other >= 0 && other < objects()) {
-        const int at_other = state_.at(other, slot);
-        const Vector3d other_arm = vector_at(state_.p, at) + arm - vector_at(state_.p, at_other);
-        speed -= normal.dot(vector_at(state_.v, at_other) + vector_at(state_.w, at_other).cross(other_arm));
-        acceleration = 0.0;
+      if (other >= 0) {
+        // Bodies that hands move count as they move.
+        speed -= normal.dot(velocity_at(slot, other, vector_at(state_.p, at) + arm));
+        const bool other_falls = other < objects() && motion(slot, other) != LaneMotion::kHeld;
+        acceleration = other_falls == falls ? 0.0 : other_falls ? -acceleration : acceleration;
       }
-      first = std::min(first, split_time({static_cast<double>(c.gap), speed, acceleration, reach}, scene_->options));
+      const auto gap = static_cast<double>(c.gap);
+      first = std::min(first, split_time({gap, speed, acceleration, reach}, scene_->options));
+      if (gap > scene_->options.touching_distance) continue;
+      const Vector3d spin = other < 0 ? w : Vector3d(w - vector_at(state_.w, state_.at(other, slot)));
+      const Vector3d middle = vector_at(state_.p, at) + arm, aside = 0.5 * gap * normal;
+      first = std::min(first, rim_time(slot, object, middle + aside, normal, spin));
+      if (other >= 0 && other < objects())
+        first = std::min(first, rim_time(slot, other, middle - aside, -normal, -spin));
     }
   }
   return parts_until(first, scene_->options.step, left);
@@ -84,10 +111,11 @@ void LaneEngine::split(std::span<const std::uint8_t> wanted) {
     if (!wanted[i]) continue;
     int total = 0;
     for (int object = 0; object < objects(); ++object) total += state_.contact_count[place_of(object, slot)];
-    if (total == 0 || !may_split(slot)) continue;
+    if (total == 0 || driven_[i]) continue;
     taken_[i] = parts_to_impact(slot, left_[i]);
     if (taken_[i] == left_[i]) continue;
     set_share(slot, taken_[i]);
+    lead(slot, kStepParts - left_[i], kStepParts - left_[i] + taken_[i]);
     shorten_contacts(slot, left_[i]);
     shortened_[i] = 1;
     any = true;
@@ -146,6 +174,7 @@ void LaneEngine::advance(std::span<const std::uint8_t> wanted) {
       any = true;
       keep_pressed(slot);
       set_share(slot, left_[i]);
+      lead(slot, kStepParts - left_[i], kStepParts);
       forget_contacts(slot);
     }
     if (!any) break;

@@ -75,6 +75,7 @@ void LaneInstance::load(LaneEngine& engine, int slot) {
   player_.load(now, dt_, felt_, released_, loads_);
   set_free(engine, slot);
   for (const ActionPlayer::Load& load : loads_) {
+    driven_ = driven_ || !load.blow;
     engine.strike(slot, load.object, mass(load.object), load.impulse, load.turn, load.blow ? 0.0 : dt_);
     if (load.keeps_attitude) engine.turn_with(slot, load.object, load.spin);
     calm_steps_[static_cast<std::size_t>(load.object)] = 0;
@@ -83,11 +84,14 @@ void LaneInstance::load(LaneEngine& engine, int slot) {
 
 void LaneInstance::before_step(LaneEngine& engine, int slot) {
   began_ = steps_ == 0;
+  driven_ = false;
+  engine.drive(slot, false);
   if (settled_) return;
   const double now = time();
   // As ActionPlayer::advance: times are met to the nearest step.
   if (next_due_ <= now + 0.5 * dt_) run_due(engine, slot);
   if (player_.has_loads(now)) load(engine, slot);
+  engine.drive(slot, driven_);
   for (std::size_t i = 0; i < scene_->robot_bodies.size(); ++i) {
     const int body = scene_->robot_bodies[i];
     const int robot = static_cast<int>(i);

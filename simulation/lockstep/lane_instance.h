@@ -55,6 +55,7 @@ class LaneInstance {
   bool acts_ = false;  // something is held, moved by a timeline, or to be done
   double next_due_ = 0.0, finish_time_ = 0.0;
   bool began_ = false;
+  bool driven_ = false;   // in this step, by a hand's force
   bool settled_ = false;  // nothing is moved from now on, and all is placed
   std::vector<geometry::Pose> poses_;
   std::vector<ActionPlayer::Released> released_;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "prescene/simulation/rules/contact_rules.h"
+
 namespace prescene::simulation {
 namespace {
 
@@ -23,6 +25,23 @@ double split_time(const Approach& approach, const MechanicsOptions& options) {
   // gap + speed t + acceleration t^2 / 2 = 0
   const double discriminant = speed * speed - 2.0 * approach.acceleration * gap;
   return discriminant > 0.0 ? 2.0 * gap / (std::sqrt(discriminant) - speed) : kNever;
+}
+
+bool leans(const LeaningRim& rim) {
+  const double upright = std::abs(rim.axis.dot(rim.normal));
+  const double lying = std::sqrt(std::max(0.0, 1.0 - upright * upright));
+  return lying > kFlatCap && upright > lying;
+}
+
+geometry::Vector3d lowest_of(const LeaningRim& rim) {
+  return (rim.axis.dot(rim.normal) * rim.axis - rim.normal).normalized();
+}
+
+double roll_time(const LeaningRim& rim) {
+  // What is above in the rim's plane, and how that turns about the axis.
+  const geometry::Vector3d above = rim.normal - rim.axis.dot(rim.normal) * rim.axis;
+  const double rate = std::abs(rim.axis.dot(above.cross(rim.spin.cross(rim.normal)))) / above.squaredNorm();
+  return rate > 0.0 ? kSplitRoll / rate : std::numeric_limits<double>::infinity();
 }
 
 int parts_until(double time, double step, int left) {

@@ -56,6 +56,32 @@ TEST(ImpactSplit, PartsEndBeforeTheImpactAndGoOn) {
   EXPECT_EQ(parts_until(7.5 * part, kStep, 7), 7);
 }
 
+TEST(ImpactSplit, ARimThatLeansTouchesWhereItIsLowest) {
+  using geometry::Vector3d;
+  const Vector3d up = Vector3d::UnitZ();
+  const Vector3d axis(std::sin(0.1), 0.0, std::cos(0.1));
+  const Vector3d lowest(std::cos(0.1), 0.0, -std::sin(0.1));
+  EXPECT_LT((lowest_of({axis, up, Vector3d::Zero()}) - lowest).norm(), 1e-12);
+  EXPECT_LT((lowest_of({-axis, up, Vector3d::Zero()}) - lowest).norm(), 1e-12);
+  EXPECT_TRUE(leans({axis, up, Vector3d::Zero()}));
+  EXPECT_FALSE(leans({up, up, Vector3d::Zero()}));                 // stands
+  EXPECT_FALSE(leans({Vector3d::UnitX(), up, Vector3d::Zero()}));  // lies
+}
+
+TEST(ImpactSplit, ARimIsRolledOverAsFastAsItTurnsBelowTheNormal) {
+  using geometry::Vector3d;
+  const Vector3d up = Vector3d::UnitZ();
+  const Vector3d axis(std::sin(0.1), 0.0, std::cos(0.1));
+  // About its own axis the whole rim passes; about the normal, as a whirling coin seen from above, none of it.
+  EXPECT_NEAR(roll_time({axis, up, 5.0 * axis}), kSplitRoll / 5.0, 1e-12);
+  EXPECT_GT(roll_time({axis, up, 5.0 * up}), 1e9);
+  EXPECT_GT(roll_time({axis, up, 5.0 * Vector3d::UnitY()}), 1e9);  // it only tilts further
+  // Tilting aside: the normal goes by w t across the rim's plane, where it is sin(tilt) long.
+  EXPECT_NEAR(roll_time({axis, up, 2.0 * Vector3d::UnitX()}), kSplitRoll * std::sin(0.1) / 2.0, 1e-12);
+  // A rim at rest never goes on.
+  EXPECT_EQ(roll_time({axis, up, Vector3d::Zero()}), kNever);
+}
+
 TEST(ImpactSplit, BoundsTheWorkOfAStep) {
   EXPECT_EQ(most_splits(0), 16);
   EXPECT_EQ(most_splits(4), 16);

@@ -152,6 +152,69 @@ TEST_P(Impacts, OfOneEdgeFollowNewtonsAndCoulombsLaws) {
   }
 }
 
+/// Adds a box that a hand moves, and takes the floor away.
+void add_plate(Scene& scene, const Vector3d& size, const Pose& X_begin, const Pose& X_end, double duration) {
+  belief::KinematicBody plate;
+  plate.name = "plate";
+  plate.collision = {belief::PrimitiveShape{BoxShape{size}, Pose{}}};
+  plate.contact.friction = belief::FixedScalar{1.0};
+  plate.contact.restitution = belief::FixedScalar{1.0};
+  plate.timeline = {{0.0, X_begin}, {duration, X_end}};
+  scene.robot.push_back(plate);
+  scene.supports[0].X_WS = Pose::from_translation({0.0, 0.0, -10.0});
+}
+
+TEST_P(Impacts, OfAHandThatMovesAreThoseOfOneAtRest) {
+  // Galileo: a plate that rises does to what turns above it what one at rest does to the same that falls faster.
+  const auto met = [&](double rising) {
+    Scene scene = die_of(0.5);
+    add_plate(scene, {2.0, 2.0, 0.1}, Pose::from_translation({0.0, 0.0, -0.05}),
+              Pose::from_translation({0.0, 0.0, rising - 0.05}), 1.0);
+    std::vector<WorldState> starts = thrown(scene, 100, 0.12, 15.0);
+    for (WorldState& start : starts) start.objects[0].V_WO.linear.z() = rising - 1.0;
+    std::vector<belief::ObjectState> ends;
+    for (const belief::Trajectory& run : runs_at(scene, starts, 1.0 / 240.0, 0.15)) {
+      ends.push_back(run.final().objects[0]);
+      ends.back().V_WO.linear.z() -= rising;
+    }
+    return ends;
+  };
+  const auto at_rest = met(0.0), moving = met(1.0);
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < at_rest.size(); ++i) {
+    const geometry::Twist &a = at_rest[i].V_WO, &b = moving[i].V_WO;
+    errors.push_back((a.linear - b.linear).norm() + 0.05 * (a.angular - b.angular).norm());  // m/s
+  }
+  std::sort(errors.begin(), errors.end());
+  RecordProperty("median", std::to_string(errors[50]));
+  RecordProperty("upper_quartile", std::to_string(errors[75]));
+  EXPECT_LT(errors[50], 1e-3);
+  EXPECT_LT(errors[75], 5e-3);
+}
+
+TEST_P(Impacts, OfASwungHandAreThoseOfItsPlaceAndSpeedAtTheImpact) {
+  // A ball without friction leaves with 1 + e times the speed of the paddle where it is hit, square to the paddle.
+  constexpr double kRadius = 0.05, kThickness = 0.02, kDistance = 0.5, kSpin = 2.0, kRestitution = 0.5;
+  ObjectModel ball = primitive_model("ball", geometry::Sphere{kRadius});
+  ball.contact.friction = belief::FixedScalar{0.0};
+  ball.contact.impact_friction = belief::FixedScalar{0.0};
+  ball.contact.restitution = belief::FixedScalar{kRestitution};
+  Scene scene = floor_scene(ball);
+  scene.gravity_W.setZero();
+  add_plate(scene, {1.4, kThickness, 0.3}, Pose{about(Vector3d::UnitZ(), -0.5), {}},
+            Pose{about(Vector3d::UnitZ(), kSpin - 0.5), {}}, 1.0);
+  WorldState start = start_of(scene);
+  start.objects[0].X_WO.translation = {kDistance, 0.0, 0.0};
+  const double apart = kRadius + 0.5 * kThickness;
+  const double angle = -std::asin(apart / kDistance);
+  const double speed = (1.0 + kRestitution) * kSpin * std::sqrt(kDistance * kDistance - apart * apart);
+  const Vector3d expected = speed * Vector3d(-std::sin(angle), std::cos(angle), 0.0);
+  for (const double step : {1.0 / 60.0, 1.0 / 240.0, 1.0 / 1000.0}) {
+    const Vector3d reached = runs_at(scene, {start}, step, 0.3)[0].final().objects[0].V_WO.linear;
+    EXPECT_LT((reached - expected).norm(), 5e-3) << step << ": " << reached.transpose();
+  }
+}
+
 double share_of_square_faces(const std::vector<belief::Trajectory>& runs) {
   double square = 0.0;
   for (const belief::Trajectory& run : runs) {

@@ -12,9 +12,15 @@
 //     left -= splits < most_splits(1) ? parts_until(first, options.step, left) : left;
 //   }
 //
-// Nothing is split while something is moved by other than contacts: that goes from the start of a step to its end.
+// What hands move goes on in every part as it does in the whole step, and contacts count its velocity. While a hand of
+// limited force drives something nothing is split: it does what the whole step takes.
+//
+// The second thing that splits a step is a rim that rolls. A round body that leans on its rim touches with one point,
+// which may run round the rim far faster than the body turns. The points beside it are contacts, too, and where a step
+// rolls over them they take energy as if they hit.
 #pragma once
 
+#include "prescene/geometry/pose.h"
 #include "prescene/simulation/rules/mechanics_options.h"
 
 namespace prescene::simulation {
@@ -38,6 +44,24 @@ struct Approach {
 /// `restitution_speed` do not hit. What overlaps by more than `touching_distance` is jammed and gets one impulse a
 /// step: many that are not settled would add energy.
 double split_time(const Approach& approach, const MechanicsOptions& options);
+
+/// A part of a step ends at the latest when the point that touches has gone on by so much along a rim, rad. At 0.2 a
+/// wobbling cylinder still loses half of its energy to points of the rim that it rolls over
+/// (docs/studies/uncertain_physics.md).
+inline constexpr double kSplitRoll = 0.1;
+
+/// A rim that leans on something flat; all in the same frame.
+struct LeaningRim {
+  geometry::Vector3d axis;    ///< Unit: of the rim.
+  geometry::Vector3d normal;  ///< Unit: of what is below, towards the rim.
+  geometry::Vector3d spin;    ///< rad/s, as seen from what is below.
+};
+/// It touches with one point of the rim: neither flat with the cap nor with the side.
+bool leans(const LeaningRim& rim);
+/// The lowest point of a rim that leans, from its middle; unit.
+geometry::Vector3d lowest_of(const LeaningRim& rim);
+/// How long the lowest point of a rim that leans takes to go on by kSplitRoll, s.
+double roll_time(const LeaningRim& rim);
 
 /// Whole parts of a step of `step` seconds that end before the first impact at `time`, at least one; `left`, those that
 /// are not yet taken, if it comes after them.
