@@ -192,9 +192,16 @@ supports:
 robot:
   hand: {box: [0.05, 0.05, 0.02], pose: {position: [0, 0, 0.3]}}
 objects:
-  box: {model: box, held_by: hand, pose: {position: [0, 0, 0.23], normal: {position: [0.01, 0.01, 0.01], rotation_deg: [5, 5, 5]}}}
+  box:
+    model: box
+    held_by: hand
+    pose: {position: [0, 0, 0.23], normal: {position: [0.01, 0.01, 0.01], rotation_deg: [5, 5, 5]}}
 actions:
-  - {time: 0.2, transport: {object: box, pose: {position: [0.1, 0.1, 0.2], rotation: {euler_deg: [0, 0, 40]}}, duration: 0.5}}
+  - time: 0.2
+    transport:
+      object: box
+      pose: {position: [0.1, 0.1, 0.2], rotation: {euler_deg: [0, 0, 40]}}
+      duration: 0.5
 camera:
   width: 80
   height: 60
