@@ -13,6 +13,7 @@
 #include "prescene/belief/distribution.h"
 #include "prescene/filter/operators/rivals.h"
 #include "prescene/filter/operators/standing.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "rival_search.h"
 #include "turns.h"
 
@@ -37,6 +38,7 @@ constexpr double kClimbGrowth = 0.5;   // of the steps, from round to round
 constexpr int kClimbRounds = 3;
 constexpr double kHopelessTurn = 15.0;          // nats behind what was followed
 constexpr double kClearlyBetter = 1.0;          // nats
+constexpr double kMostKnownBetter = 15.0;       // nats, of earlier frames against one
 constexpr double kLeastTurnDeviation = 0.0175;  // rad, of a prior: scenes are no more exact
 constexpr double kLeastLogWeight = -700.0;      // of a turn whose particles have none
 constexpr double kNoEvidence = -std::numeric_limits<double>::infinity();
@@ -151,6 +153,14 @@ std::vector<JudgedTurn> turns_before(const std::vector<TurnFit>& fits, const std
   return judged;
 }
 
+/// What earlier frames say against a pose, nats: of what looks before this one had part in.
+double log_known(const Particle& particle, const Pose& X_WO, double gain) {
+  const Vector6d off = geometry::box_minus(X_WO, particle.X_WO);
+  const geometry::Cholesky6 covariance(particle.covariance.topLeftCorner<6, 6>());
+  if (!covariance.positive_definite()) return 0.0;
+  return (1.0 - gain) * std::min(kMostKnownBetter, 0.5 * off.dot(covariance.solve(off)));
+}
+
 void put_at(const Pose& X_WO, const geometry::Matrix6d& covariance, Particle& particle) {
   particle.X_WO = X_WO;
   particle.covariance.topLeftCorner<6, 6>() = covariance;
@@ -208,7 +218,8 @@ int look_at_turns(const TurnLook& look, const SymmetryGroup& symmetry, const Wei
 
   for (std::size_t i = 0; i < particles.size(); ++i) {
     const JudgedTurn& turn = judged[turn_of[i]];
-    if (turn.fit->log(look.cameras) > fits.all[i].log(look.cameras) + kClearlyBetter)
+    const double better = turn.fit->log(look.cameras) - fits.all[i].log(look.cameras);
+    if (better > kClearlyBetter && better > kClearlyBetter + log_known(particles[i], turn.fit->X_WO, look.gain))
       put_at(turn.fit->X_WO, fine.covariance_at(turn.fit->X_WO, fits.pixels, spread), particles[i]);
     particles[i].log_weight += turn.log_odds - turns[turn_of[i]].log_before;
   }

@@ -56,7 +56,8 @@ struct TurnLook {
 /// (1 - gain) l + gain (p + f): f of this frame, tempered, and p of the prior, or kSlipLogOdds of turns that are no
 /// likelier by the scene than one that was followed and is turned otherwise than the scene says. A turn that was not
 /// held had kFoundLogOdds, and is held from kFoundLogOdds on, in place of the lightest particles. Particles go to where
-/// the image fits best within their turn, where that is clearly better (1 nat). Returns how many turns are as likely.
+/// the image fits best within their turn, where that is clearly better: by 1 nat, and by 1 - gain of what their
+/// covariance, from the frames before, says against it (15 nats at most). Returns how many turns are as likely.
 int look_at_turns(const TurnLook& look, const geometry::SymmetryGroup& symmetry, const WeightOptions& weighting,
                   const InitialiseOptions& spread, const FilterTools& tools, belief::ObjectBelief& object);
 
