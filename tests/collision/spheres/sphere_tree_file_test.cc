@@ -73,7 +73,7 @@ TEST_F(SphereTreeFile, BelongsToItsMeshAndSettings) {
   EXPECT_FALSE(read_sphere_tree(path_, *mesh_, packing_options_, {.branching = 16}).ok());
   const auto another = *Mesh::make(geometry::make_mesh(geometry::Cone{0.1, 0.3}), "cone");
   EXPECT_FALSE(read_sphere_tree(path_, *another, packing_options_, tree_options_).ok());
-  EXPECT_EQ(read_sphere_tree(path_ += ".none", *mesh_, packing_options_, tree_options_).status().code(),
+  EXPECT_EQ(read_sphere_tree(path_.string() + ".none", *mesh_, packing_options_, tree_options_).status().code(),
             core::StatusCode::kNotFound);
 }
 
