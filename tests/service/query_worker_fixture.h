@@ -50,7 +50,10 @@ inline std::shared_ptr<belief::Belief> belief_of(const char* scene_text) {
 
 /// Is answered from so many instances however long they take, where the worker's own limit is far.
 inline std::string short_question(const std::string& id) {
-  return R"({"id": ")" + id + R"(", "stability": {"object": "box", "effort": {"exact_instances": 8}}})";
+  std::string question = R"({"id": ")";
+  question += id;
+  question += R"(", "stability": {"object": "box", "effort": {"exact_instances": 8}}})";
+  return question;
 }
 
 /// The answers by their ids, of which each is another. When one question is done the next one of its client begins, and
