@@ -138,7 +138,8 @@ void ContactRows<kMany>::load_row(const RowGroup& group, int row) {
   const V difference = half * (k11 - k22);
   const V stiffest = half * (k11 + k22) + hn::Sqrt(difference * difference + k12 * k12);
   put(row, kPerSlipStep, stiffest);
-  put(row, kSlipStep, inverse_of(stiffest));
+  // Lanes without this contact have no slip: the least one, whose square is none, would pass the test of its size.
+  put(row, kSlipStep, hn::IfThenElseZero(hn::Ge(column(11), set<V>(0.0)), inverse_of(stiffest)));
   put(row, kRollingArm, column(10));
   if (rolls()) put(row, kPerRollingStep, kPair ? softness(group.a) + softness(group.b) : softness(group.a));
   put3(row, kRolling, set3<V>(0.0, 0.0, 0.0));

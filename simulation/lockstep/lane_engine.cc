@@ -42,6 +42,7 @@ LaneEngine::LaneEngine(std::shared_ptr<const CompiledLockstep> scene, int slots)
   const LockstepScene& lanes = scene_->lanes;
   const auto of_objects = most * static_cast<std::size_t>(lanes.objects);
   moved_.resize(of_objects);
+  kept_.resize(of_objects);
   present_.resize(most * lanes.bodies.size() - of_objects);
   driven_.resize(most);
   ways_.resize(most * lanes.bodies.size());
@@ -125,6 +126,7 @@ void LaneEngine::move(int from, int to) {
   for (int body = 0; body < static_cast<int>(scene_->lanes.bodies.size()); ++body) {
     const int a = state_.at(body, from);
     const int b = state_.at(body, to);
+    ways_[static_cast<std::size_t>(b)] = ways_[static_cast<std::size_t>(a)];
     copy(state_.p, a, b);
     copy(state_.v, a, b);
     copy(state_.w, a, b);

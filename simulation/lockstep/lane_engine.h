@@ -193,6 +193,7 @@ class LaneEngine {
   std::vector<std::uint8_t> going_, shortened_;
   std::vector<int> left_, taken_;  // parts of the step
   std::vector<Pressed> pressed_;
+  std::vector<int> kept_;  // by object, of pressed_
 };
 
 }  // namespace prescene::simulation

@@ -127,8 +127,11 @@ void LaneEngine::split(std::span<const std::uint8_t> wanted) {
 void LaneEngine::keep_pressed(int slot) {
   for (int object = 0; object < objects(); ++object) {
     const geometry::Matrix3d R = rotation(slot, object).toRotationMatrix();
-    for (const LaneContact& c : found(slot, object))
-      if (c.impulse > 0) pressed_.push_back({slot, object, c, R * vector_of(c.position), R * vector_of(c.normal)});
+    int& kept = kept_[place_of(object, slot)];
+    for (const LaneContact& c : found(slot, object)) {
+      if (c.impulse > 0 && kept++ < state_.room())
+        pressed_.push_back({slot, object, c, R * vector_of(c.position), R * vector_of(c.normal)});
+    }
   }
 }
 
@@ -145,6 +148,7 @@ void LaneEngine::give_back_pressed() {
     }
     state_.contacts(at)[count++] = kept.contact;
   }
+  for (const Pressed& kept : pressed_) kept_[place_of(kept.object, kept.slot)] = 0;
   pressed_.clear();
 }
 

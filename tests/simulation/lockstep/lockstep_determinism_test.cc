@@ -262,8 +262,9 @@ TEST_P(LockstepBits, LiveInstancesTakeLittleMemory) {
     return static_cast<double>(heap_bytes() - before);
   };
   // Bodies of spheres have room for twice as many contacts. What sleeps takes 1.5 KiB an object, what a hand does to it
-  // 0.3.
-  EXPECT_LT((bytes_of(256) - bytes_of(64)) / 192, (std::string(GetParam()) == "hollow" ? 32.0 : 22.0) * 1024);
+  // 0.3; what pressed in an earlier part of a step, while hands move, up to 8 in all.
+  const std::string name = GetParam();
+  EXPECT_LT((bytes_of(256) - bytes_of(64)) / 192, (name == "hollow" ? 32.0 : name == "handed" ? 30.0 : 22.0) * 1024);
 }
 
 TEST(LockstepDeterminism, CancelledRunsEnd) {
