@@ -28,7 +28,7 @@ constexpr double kTimeRounding = 1e-9;  // s; times that differ by less are the 
 /// What the hands and what they hold do by plan, action by action.
 class Plan {
  public:
-  explicit Plan(const Scene& scene, const MotionStart& start = {})
+  Plan(const Scene& scene, const MotionStart& start)
       : scene_(scene), start_(start), bodies_(scene.robot.size()), objects_(scene.objects.size()) {
     for (std::size_t i = 0; i < objects_.size(); ++i) {
       const SceneObject& object = scene.objects[i];
@@ -191,9 +191,7 @@ Pose turned_about(const Pose& X_WO, const Vector3d& pivot_O, const Vector3d& axi
 
 Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, int body, double time) {
   if (actions.empty()) return pose_at(scene.robot[static_cast<std::size_t>(body)], time);
-  Plan plan(scene);
-  plan.begin(actions, time);
-  return plan.pose_of(body, time);
+  return robot_pose_at(scene, actions, MotionStart{}, body, time);
 }
 
 Pose robot_pose_at(const Scene& scene, std::span<const Action> actions, const MotionStart& start, int body,
