@@ -72,6 +72,8 @@ struct DdsNode::Impl {
     stop_receiving();
     graph.reset();
     if (participant > 0) dds_delete(participant);
+    // As in listen(): what Cyclone's threads did last with a subscription is known by its counter.
+    for (const Subscription& subscription : subscriptions) subscription.arrived.load(std::memory_order_acquire);
   }
 
   void run();
