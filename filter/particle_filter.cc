@@ -336,7 +336,7 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   const bool has_depth = observation.frame.depth && !observation.frame.depth->empty() &&
                          observation.frame.depth->width() == observation.frame.camera.width &&
                          observation.frame.depth->height() == observation.frame.camera.height &&
-                         geometry::validate(observation.frame.camera).ok();
+                         geometry::validate_sensor(observation.frame.camera).ok();
   if (has_depth && observation.X_WC.is_finite()) follow_supports(observation, result);
 
   const std::vector<Pose> X_WG = robot_poses(belief, observation, &result.degraded);

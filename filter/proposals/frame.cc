@@ -81,7 +81,7 @@ core::Status prepare_frame(const std::shared_ptr<const belief::Scene>& scene, co
                                ": the filter needs colour registered to the depth image");
   for (const Pose& pose : X_WG)
     if (!pose.is_finite()) return core::invalid_input("a robot body's pose is not finite: check its transforms");
-  PRESCENE_RETURN_IF_ERROR(geometry::validate(rgbd.camera).at("the frame's camera"));
+  PRESCENE_RETURN_IF_ERROR(geometry::validate_sensor(rgbd.camera).at("the frame's camera"));
 
   const BeliefView known = known_surroundings(*scene, X_WG, MeshDetail::kSurroundings, *tools.meshes);
   // Scenes are copied where one thing of them changes.

@@ -35,7 +35,7 @@ FrameSampling sampled_for(const belief::Belief& belief, const belief::Observatio
                           const FrameOptions& options, MeshCache& meshes) {
   FrameSampling sampling{.terms = options.terms};
   const geometry::PinholeCamera& camera = observation.frame.camera;
-  if (!geometry::validate(camera).ok()) return sampling;
+  if (!geometry::validate_sensor(camera).ok()) return sampling;
   const int coarse = std::max(1, options.terms.target_width);
   const Pose X_CW = observation.X_WC.inverse();
   double least = std::numeric_limits<double>::infinity(), all = 0.0;  // pixels of the full image

@@ -189,8 +189,10 @@ void Outline::see_colors(const Pose& X_CO, const geometry::DepthImage& depth, co
                          const rendering::FrameTerms& terms) {
   // Calls `see` for the pixels of a line on either side of where the edge may be.
   const auto beside = [&](const Point& point, const Line& line, const auto& see) {
-    const int inner = std::min(line.reach, static_cast<int>(0.5 * point.width * camera_.fx));
-    const int innermost = std::min(2 * line.reach, static_cast<int>(point.width * camera_.fx));
+    // The width in pixels may be too large for an int.
+    const double width = point.width * camera_.fx;
+    const int inner = static_cast<int>(std::min<double>(line.reach, 0.5 * width));
+    const int innermost = static_cast<int>(std::min<double>(2 * line.reach, width));
     const auto see_from = [&](int first, int last, bool is_inside) {
       for (int s = first; s <= last; ++s) {
         const auto at = line.pixel(s);

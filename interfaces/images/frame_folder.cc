@@ -126,7 +126,7 @@ Result<PinholeCamera> find_camera(const fs::path& folder, const FrameFolderOptio
     return core::not_found(folder.string() + ": there is no " + kIntrinsicsFile +
                            "; put the 3x3 camera matrix there, or give the camera (width, height, fx, fy, cx, cy)");
   }
-  const Status status = geometry::validate(camera);
+  const Status status = geometry::validate_sensor(camera);
   if (!status.ok()) return status.at(place);
   return camera;
 }

@@ -89,7 +89,7 @@ Result<PinholeCamera> to_camera(const RosCameraInfo& info, const CameraRules& ru
                                std::to_string(rules.image_width) + " x " + std::to_string(rules.image_height) +
                                "; send the calibration of this resolution, or set binning and roi");
   }
-  PRESCENE_RETURN_IF_ERROR(geometry::validate(camera));
+  if (const core::Status sensor = geometry::validate_sensor(camera); !sensor.ok()) return sensor.at(field);
 
   if (rules.rectified && info.p[3] != 0.0) {
     report->warnings.push_back("p: is that of the right camera of a stereo pair, " +

@@ -96,6 +96,28 @@ TEST(PinholeCamera, ValidationNamesTheField) {
   EXPECT_THAT(message_with([](PinholeCamera& c) { c.cy = std::nan(""); }), HasSubstr("cy"));
 }
 
+TEST(PinholeCamera, WhatNoSensorHasIsRefusedWithItsValue) {
+  EXPECT_TRUE(validate_sensor(kCamera).ok());
+  for (const double value : {1e300, 1e-300, 1e6, 0.5}) {
+    for (double PinholeCamera::*field : {&PinholeCamera::fx, &PinholeCamera::fy}) {
+      PinholeCamera camera = kCamera;
+      camera.*field = value;
+      EXPECT_TRUE(validate(camera).ok()) << "close-ups may have it";
+      EXPECT_EQ(validate_sensor(camera).code(), core::StatusCode::kInvalidInput) << value;
+    }
+  }
+  for (double PinholeCamera::*field : {&PinholeCamera::cx, &PinholeCamera::cy}) {
+    for (const double value : {-1e300, 2e5}) {
+      PinholeCamera camera = kCamera;
+      camera.*field = value;
+      EXPECT_EQ(validate_sensor(camera).code(), core::StatusCode::kInvalidInput) << value;
+    }
+  }
+  PinholeCamera camera = kCamera;
+  camera.fy = 1e300;
+  EXPECT_THAT(validate_sensor(camera).message(), HasSubstr("camera fy is 1e+300: "));
+}
+
 TEST(Image, RowsLieOneAfterTheOther) {
   Image<int> image(3, 2, 5);
   image(2, 1) = 7;

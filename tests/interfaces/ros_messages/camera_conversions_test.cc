@@ -57,6 +57,12 @@ TEST(Cameras, RefuseWhatIsNoCalibration) {
     info.k[4] = bad;
     EXPECT_THAT(message_of(info), HasSubstr("k: focal lengths 600, ")) << bad;
   }
+  for (const double bad : {1e300, 1e-300}) {
+    info = to_ros_camera_info(kCamera, {});
+    info.k[0] = info.k[4] = bad;
+    EXPECT_THAT(message_of(info), HasSubstr("k: camera fx is 1e")) << bad;
+    EXPECT_THAT(message_of(info), HasSubstr("give the focal length in pixels")) << bad;
+  }
   info = to_ros_camera_info(kCamera, {});
   info.height = 0;
   EXPECT_THAT(message_of(info), HasSubstr("width x height: is 640 x 0"));

@@ -36,4 +36,8 @@ struct PinholeCamera {
 /// Sizes positive and at most 16384, focal lengths positive, all finite; the message names the field.
 core::Status validate(const PinholeCamera& camera);
 
+/// The same of a camera that took an image, and not of one that a picture is drawn with: also focal lengths from 1 to
+/// 1e5 pixels, and a principal point within 1e5 pixels of the first one. Intrinsics beyond that are damaged.
+core::Status validate_sensor(const PinholeCamera& camera);
+
 }  // namespace prescene::geometry
