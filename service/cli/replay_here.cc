@@ -201,6 +201,7 @@ core::Status replay_here(const ReplayOptions& options, VerbContext& context) {
        {"messages", summary->messages},
        {"refused", summary->refused},
        {"skipped_frames", summary->skipped},
+       {"last_skip", summary->last_skip},
        {"followed_step_records", summary->followed_step_records},
        {"compared_steps", summary->compared},
        {"different_steps", summary->different},

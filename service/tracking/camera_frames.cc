@@ -135,9 +135,9 @@ std::optional<core::Status> CameraFrames::take_in(const interfaces::ReceivedMess
     const InputTopics& topics = camera.input.topics;
     if (named(topics.depth)) {
       core::Result<DepthMessage>& depth = *images.depth;
-      if (depth && cameras_.size() > 1 && depth->report.measured == 0)
+      if (depth && depth->report.measured == 0)
         depth->report.warnings.push_back(
-            "no pixel of its depth image is measured: look whether it is covered, dazzled, or too near");
+            "no pixel of its depth image is measured: look whether the camera is covered, dazzled, or too near");
       return depth ? assembler.add_depth(*std::move(depth), index, received_ns) : depth.status();
     }
     if (named(topics.color)) {

@@ -37,10 +37,24 @@ bool too_many(const Entries& entries, std::size_t most, Image Entries::value_typ
   return entries.size() > most || (entries.size() > 1 && pixels > kMaxWaitingPixels);
 }
 
-std::string text_of(const geometry::PinholeCamera& camera) {
-  const auto pair = [](double x, double y) { return core::fixed_text(x, 1) + " and " + core::fixed_text(y, 1); };
+template <class Image>
+std::string size_text(const Image& image) {
+  return std::to_string(image.width()) + " x " + std::to_string(image.height());
+}
+
+std::string text_of(const geometry::PinholeCamera& camera, int decimals) {
+  const auto pair = [decimals](double x, double y) {
+    return core::fixed_text(x, decimals) + " and " + core::fixed_text(y, decimals);
+  };
   return std::to_string(camera.width) + " x " + std::to_string(camera.height) + " pixels, focal lengths " +
          pair(camera.fx, camera.fy) + ", principal point " + pair(camera.cx, camera.cy);
+}
+
+/// " from ... to ...", with as many decimals as it takes to tell the two apart.
+std::string change_text(const geometry::PinholeCamera& before, const geometry::PinholeCamera& now) {
+  int decimals = 1;
+  while (decimals < 9 && text_of(before, decimals) == text_of(now, decimals)) ++decimals;
+  return " from " + text_of(before, decimals) + " to " + text_of(now, decimals);
 }
 
 }  // namespace
@@ -233,6 +247,11 @@ FrameAssembler::Attempt FrameAssembler::assemble(const Waiting& waiting, bool ou
     if (color && color->image->width() == camera_->width && color->image->height() == camera_->height) {
       observation.frame.color = color->image;
       frame.color = color->index;
+    } else {
+      frame.doubts.push_back(color ? "the colour image has " + size_text(*color->image) + " pixels, the depth image " +
+                                         size_text(*waiting.depth) + ": depth alone is used; publish both of one size"
+                                   : "no colour image came with the depth image: depth alone is used; look at the "
+                                     "stamps of both, or give no colour topic where there is none (--color-topic '')");
     }
   }
   core::Result<geometry::Pose> X_WC =
@@ -268,10 +287,9 @@ std::optional<AssembledFrame> FrameAssembler::finish(std::size_t index, Assemble
   const Waiting taken = waiting_[index];
   if (last_taken_ && (last_taken_->camera != *camera_ || last_taken_->lens != lens_)) {
     const bool is_lens = last_taken_->camera == *camera_;
-    frame.doubts.push_back(
-        "the camera info has changed" +
-        (is_lens ? " in its lens" : " from " + text_of(last_taken_->camera) + " to " + text_of(*camera_)) +
-        ": the new one is used; if the camera was not set otherwise, two nodes publish it");
+    frame.doubts.push_back("the camera info has changed" +
+                           (is_lens ? " in its lens" : change_text(last_taken_->camera, *camera_)) +
+                           ": the new one is used; if the camera was not set otherwise, two nodes publish it");
   }
   last_taken_ = Taken{taken.index, taken.stamp_ns, taken.received_ns, *camera_, lens_};
   for (std::size_t older = 0; older < index; ++older) skip(waiting_[older], "a newer frame was ready");

@@ -205,6 +205,26 @@ TEST_F(CameraFramesTest, SaysWhichCameraSeesNothingAtAll) {
   EXPECT_THAT(side->doubts, ElementsAre(HasSubstr("camera 'side': no pixel of its depth image is measured")));
 }
 
+TEST(CameraFrames, SaysThatItsOnlyCameraSeesNothingAtAll) {
+  CameraInput only;
+  only.topics.color = "";
+  only.assembler.X_WC = geometry::Pose::identity();
+  CameraFrames frames({only}, {}, {});
+  const interfaces::RosHeader header{interfaces::to_ros_time(kMs), "camera"};
+  const auto send = [&](const std::string& topic, const std::string& type, std::vector<std::uint8_t> cdr,
+                        MessageIndex index) {
+    const auto taken = frames.take_in({topic, type, std::move(cdr), kMs, kMs}, index, kMs);
+    ASSERT_TRUE(taken.has_value() && taken->ok());
+  };
+  send(only.topics.camera_info, "sensor_msgs/msg/CameraInfo",
+       interfaces::encode_cdr(interfaces::to_ros_camera_info({8, 6, 10.0, 10.0, 3.5, 2.5}, header)), 0);
+  send(only.topics.depth, "sensor_msgs/msg/Image",
+       interfaces::encode_cdr(interfaces::to_ros_image_16uc1(geometry::DepthImage(8, 6, 0.0F), header)), 1);
+  const auto frame = frames.take(kMs);
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_THAT(frame->doubts, ElementsAre(HasSubstr("no pixel of its depth image is measured")));
+}
+
 TEST_F(CameraFramesTest, TakesTheFramesThatARecordingNames) {
   depth("front", 1000, 1001);  // the numbers of these: 3, 4, 5
   depth("side", 1010, 1011);

@@ -145,6 +145,21 @@ TEST(FrameAssembler, GoesWithoutColourWhenItDoesNotComeInTime) {
   const auto frame = assembler.take(*assembler.next_deadline());
   ASSERT_TRUE(frame.has_value());
   EXPECT_EQ(frame->observation.frame.color, nullptr);
+  EXPECT_THAT(frame->doubts, testing::ElementsAre(testing::HasSubstr("no colour image came with the depth image")));
+}
+
+TEST(FrameAssembler, SaysWhyAColourImageOfAnotherSizeIsNotUsed) {
+  FrameAssembler assembler({}, {});
+  ASSERT_TRUE(assembler.add_camera_info(camera_info(), 1).ok());
+  ASSERT_TRUE(assembler.add_tf(transform("camera", 0, 1.0), 2, true).ok());
+  const geometry::ColorImage small(4, 3, {1, 2, 3});
+  ASSERT_TRUE(assembler.add_color(interfaces::to_ros_image(small, header(100 * kMs)), 3, 101 * kMs).ok());
+  ASSERT_TRUE(assembler.add_depth(depth_at(100 * kMs), 4, 101 * kMs).ok());
+  const auto frame = assembler.take(101 * kMs);
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_EQ(frame->observation.frame.color, nullptr);
+  EXPECT_THAT(frame->doubts, testing::ElementsAre(testing::HasSubstr(
+                                 "the colour image has 4 x 3 pixels, the depth image 8 x 6: depth alone is used")));
 }
 
 TEST(FrameAssembler, SkipsWithAReasonWhatStaysIncomplete) {
@@ -224,6 +239,9 @@ TEST(FrameAssembler, SaysOnceWhenTheCameraInfoChanges) {
   EXPECT_THAT(doubts_with(zoomed, lens), testing::IsEmpty());
   EXPECT_THAT(doubts_with(larger, lens), testing::ElementsAre(testing::HasSubstr("to 16 x 6 pixels")));
   EXPECT_THAT(doubts_with(larger, lens), testing::IsEmpty());
+  geometry::PinholeCamera finer = larger;
+  finer.fx += 0.002;
+  EXPECT_THAT(doubts_with(finer, lens), testing::ElementsAre(testing::HasSubstr("focal lengths 20.002 and 20.000")));
 }
 
 TEST(FrameAssembler, UsesTheSetCameraPoseWhenTfKnowsNone) {
