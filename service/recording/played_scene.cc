@@ -13,6 +13,7 @@
 #include "prescene/belief/robot_motion.h"
 #include "prescene/belief/scene_size.h"
 #include "prescene/belief/trajectory.h"
+#include "prescene/belief/validation.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
 #include "prescene/simulation/rules/action_draws.h"
@@ -41,6 +42,8 @@ core::Status check(const Scene& scene, const UnannouncedChange& change) {
   if (!(change.time >= 0.0 && change.time <= scene.duration))
     return core::invalid_input(at + ": its time is outside the scene's duration: give 0 to " +
                                std::to_string(scene.duration) + " s");
+  if (change.X_WO && !(change.X_WO->translation.cwiseAbs().maxCoeff() <= belief::kLengthRange.high))
+    return core::invalid_input(at + ": its place is out of range: " + belief::kLengthRange.remedy);
   for (const Action& action : scene.actions) {
     if (action.time < change.time && change.time < action.time + unbroken_duration(action) - kTimeRounding)
       return core::invalid_input(at + ": its frame, at " + core::fixed_text(change.time, 3) + " s, lies within a " +

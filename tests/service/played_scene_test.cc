@@ -326,6 +326,8 @@ TEST_F(PlayedSceneTest, RefusesWhatCannotBe) {
   fails_with({{0.5, "cup", std::nullopt}}, "has no object of that name");
   fails_with({{1.5, "left", std::nullopt}}, "outside the scene's duration");
   fails_with({{-0.1, "left", std::nullopt}}, "outside the scene's duration");
+  for (const double far : {2e4, -1e300})
+    fails_with({{0.5, "left", geometry::Pose::from_translation({0.0, far, 0.0})}}, "its place is out of range");
 }
 
 TEST(UnannouncedChanges, AreReadFromText) {
