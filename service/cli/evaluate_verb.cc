@@ -304,7 +304,8 @@ Verb add_evaluate_verb(CLI::App& app) {
       ->capture_default_str();
   verb->add_option(
           "--keep", options->keep,
-          "Of tracking: a folder for the recordings and their scene files; those that are there are used again")
+          "Of tracking: a folder for the recordings and their scene files; whole ones of the same scene, seed and rate "
+          "that are there are used again")
       ->check(file_name());
   verb->add_option("--proposals", options->proposals,
                    "Of finding: a file that --train wrote; what it learned of the rooms' models is used")

@@ -35,12 +35,49 @@ struct Sequence {
   std::uint64_t seed = 0;
 };
 
-/// Whether an earlier evaluation left this very sequence.
-bool is_recorded(const fs::path& path, const RecordingInfo& info) {
-  std::error_code error;
-  if (!fs::exists(path, error)) return false;
-  const auto reader = RecordingReader::open(path);
+constexpr std::size_t kMostSceneBytes = std::size_t{1} << 20;
+
+/// The files of a sequence.
+struct SequenceFiles {
+  fs::path recording;
+  fs::path known;  ///< What the tracker is told.
+  fs::path world;  ///< What is recorded. Written last: it says that the recording is whole, and of what it is.
+};
+
+/// The scene that is recorded, and how it is: a recording at another rate has another text.
+std::string world_text(const SuiteScene& scene, double rate) {
+  return "# recorded with --rate " + core::rounded_text(rate) + "\n" + scene.world;
+}
+
+/// Whether an earlier evaluation left this very sequence whole.
+bool is_recorded(const SequenceFiles& files, const std::string& world, const RecordingInfo& info) {
+  const auto kept = interfaces::read_file(files.world, kMostSceneBytes);
+  if (!kept || !std::equal(kept->begin(), kept->end(), world.begin(), world.end())) return false;
+  const auto reader = RecordingReader::open(files.recording);
   return reader.ok() && (*reader)->info().scene_text == info.scene_text && (*reader)->info().seed == info.seed;
+}
+
+/// Records aside, so that nobody takes a part of it for the whole: not after a stop, and not at the same time.
+core::Status record_sequence(const SuiteScene& scene, const belief::Scene& world, double rate,
+                             const RecordingInfo& info, const fs::path& path, Backends& backends,
+                             const core::Cancellation& cancellation) {
+  SimulatedRecordingOptions simulated;
+  simulated.rate = rate;
+  simulated.changes = scene.changes;
+  simulated.reports_robot = scene.reports_robot;
+  set_suite_camera(simulated);
+  PRESCENE_TRY(const fs::path aside, interfaces::create_beside(path));
+  const auto record = [&]() -> core::Status {
+    PRESCENE_TRY(const auto recording, RecordingWriter::create(aside, info));
+    PRESCENE_RETURN_IF_ERROR(simulate_recording(world, simulated, info.seed, backends, cancellation, {}, *recording));
+    return recording->close();
+  };
+  core::Status status = record();
+  std::error_code error;
+  if (status.ok()) fs::rename(aside, path, error);
+  if (error) status = core::unavailable(path.string() + ": cannot be replaced: " + error.message());
+  if (!status.ok()) fs::remove(aside, error);
+  return status.code() == core::StatusCode::kCancelled ? core::cancelled("stopped on request") : status;
 }
 
 core::Result<TrackingFigures> run_sequence(const Sequence& sequence, const TrackingOptions& options,
@@ -48,27 +85,22 @@ core::Result<TrackingFigures> run_sequence(const Sequence& sequence, const Track
                                            const core::Cancellation& cancellation) {
   const SuiteScene scene = make_suite_scene(sequence.kind, sequence.seed);
   const std::string name = sequence.kind + "_" + std::to_string(sequence.seed);
-  const fs::path recording_path = folder / (name + ".mcap");
-  if (!options.keep.empty()) {
-    PRESCENE_RETURN_IF_ERROR(interfaces::write_file(folder / (name + "_world.yaml"), scene.world));
-    PRESCENE_RETURN_IF_ERROR(interfaces::write_file(folder / (name + ".yaml"), scene.known));
-  }
-  PRESCENE_TRY(const auto world, load_scene_text(scene.world, folder / (name + "_world.yaml"), {}));
-  PRESCENE_TRY(const auto known, load_scene_text(scene.known, folder / (name + ".yaml"), {}));
+  const SequenceFiles files{folder / (name + ".mcap"), folder / (name + ".yaml"), folder / (name + "_world.yaml")};
+  const bool keeps = !options.keep.empty();
+  if (keeps) PRESCENE_RETURN_IF_ERROR(interfaces::write_file(files.known, scene.known));
+  PRESCENE_TRY(const auto world, load_scene_text(scene.world, files.world, {}));
+  PRESCENE_TRY(const auto known, load_scene_text(scene.known, files.known, {}));
   BackendSettings backend_settings;
   backend_settings.likelihood = options.likelihood;
   Backends backends(threads, backend_settings);
   const RecordingInfo info{name + ".yaml", scene.known, sequence.seed, ""};
-  if (!is_recorded(recording_path, info)) {
-    SimulatedRecordingOptions simulated;
-    simulated.rate = options.rate;
-    simulated.changes = scene.changes;
-    simulated.reports_robot = scene.reports_robot;
-    set_suite_camera(simulated);
-    PRESCENE_TRY(const auto recording, RecordingWriter::create(recording_path, info));
+  const std::string recorded_world = world_text(scene, options.rate);
+  std::error_code ignored;
+  if (!keeps || !is_recorded(files, recorded_world, info)) {
+    fs::remove(files.world, ignored);
     PRESCENE_RETURN_IF_ERROR(
-        simulate_recording(*world, simulated, sequence.seed, backends, cancellation, {}, *recording));
-    PRESCENE_RETURN_IF_ERROR(recording->close());
+        record_sequence(scene, *world, options.rate, info, files.recording, backends, cancellation));
+    if (keeps) PRESCENE_RETURN_IF_ERROR(interfaces::write_file(files.world, recorded_world));
   }
   PRESCENE_TRY(const auto tracker, Tracker::create(known, {}, sequence.seed, backends));
   TrackingCounter counter(known);
@@ -84,12 +116,11 @@ core::Result<TrackingFigures> run_sequence(const Sequence& sequence, const Track
   };
   const double begin = core::process_cpu_seconds();
   PRESCENE_TRY(const ReplaySummary summary,
-               replay_recording(recording_path, {}, *tracker, cancellation, {}, on_step, on_json));
+               replay_recording(files.recording, {}, *tracker, cancellation, {}, on_step, on_json));
   if (summary.cancelled) return core::cancelled("stopped on request");
   TrackingFigures figures = counter.figures();
   figures.cpu_seconds = core::process_cpu_seconds() - begin;
-  std::error_code ignored;
-  if (options.keep.empty()) fs::remove(recording_path, ignored);
+  if (!keeps) fs::remove(files.recording, ignored);
   return figures;
 }
 
@@ -150,6 +181,13 @@ std::vector<std::string> row_of(const std::string& kind, const TrackingFigures& 
           f.frames > 0 ? fixed_text(1e3 * f.cpu_seconds / f.frames, 0) : "-"};
 }
 
+/// Of all sequences, for those who named another.
+std::string kinds_text() {
+  std::string text;
+  for (const std::string& kind : suite_kinds()) text += kind + ", ";
+  return text + "or " + kCarriedCube;
+}
+
 }  // namespace
 
 void TrackingFigures::add(const TrackingFigures& more) {
@@ -189,8 +227,15 @@ core::Result<TrackingReport> evaluate_tracking(const fs::path& data, const Track
   for (const std::string& kind : options.kinds) {
     const std::vector<std::string>& kinds = suite_kinds();
     if (kind != kCarriedCube && std::find(kinds.begin(), kinds.end(), kind) == kinds.end())
-      return core::invalid_input("'" + kind + "' is no kind of sequence");
+      return core::invalid_input("'" + kind + "' is no kind of sequence: give one of " + kinds_text());
+    if (kind == kCarriedCube && data.empty())
+      return core::invalid_input(std::string(kCarriedCube) + " is of recorded data: name their folder (--data)");
   }
+  // Before the simulated sequences, which take minutes.
+  std::error_code none;
+  if (!data.empty() && wanted(kCarriedCube) && !fs::is_directory(data / kCarriedCube, none))
+    return core::not_found((data / kCarriedCube).string() +
+                           ": there is no such folder: name the one that holds it (--data), or leave --data out");
   PRESCENE_TRY(const auto scratch, ScratchFolder::create());
   fs::path folder = scratch->path();
   if (!options.keep.empty()) {

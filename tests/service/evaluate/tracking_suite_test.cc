@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/tracking_suite.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -126,6 +127,52 @@ TEST(TrackingSuite, TracksASequenceOfEachKindThatIsAskedFor) {
   EXPECT_FALSE(to_json(*report)["simulated"]["share_tracked"].is_null());
   options.kinds = {"juggling"};
   EXPECT_EQ(evaluate_tracking({}, options, 3, pool, {}, nullptr).status().code(), core::StatusCode::kInvalidInput);
+}
+
+TEST(TrackingSuite, DataThatIsNotThereIsSaidBeforeTheWork) {
+  core::ThreadPool pool(1);
+  TrackingOptions options;
+  options.kinds = {"juggling"};
+  const core::Status juggling = evaluate_tracking({}, options, 1, pool, {}, nullptr).status();
+  for (const std::string& kind : suite_kinds()) EXPECT_THAT(juggling.message(), testing::HasSubstr(kind));
+  options.kinds = {kCarriedCube};
+  EXPECT_THAT(evaluate_tracking({}, options, 1, pool, {}, nullptr).status().message(), testing::HasSubstr("--data"));
+  options.kinds = {};
+  int sequences = 0;
+  const core::ProgressSink count = [&](const core::Progress&) { ++sequences; };
+  const tests::ScratchDir empty;
+  EXPECT_EQ(evaluate_tracking(empty.path(), options, 1, pool, count, nullptr).status().code(),
+            core::StatusCode::kNotFound);
+  EXPECT_EQ(sequences, 0);
+}
+
+TEST(TrackingSuite, KeptRecordingsAreUsedAgainOnlyWhereTheyAreWholeAndOfTheSameRate) {
+  core::ThreadPool pool(1);
+  const tests::ScratchDir folder;
+  TrackingOptions options;
+  options.sequences = 1;
+  options.kinds = {"taken_away"};
+  const auto frames_at = [&](double rate, const std::filesystem::path& keep) {
+    options.rate = rate;
+    options.keep = keep;
+    const auto report = evaluate_tracking({}, options, 3, pool, {}, nullptr);
+    return report ? report->simulated.frames : -1;
+  };
+  const int slow = frames_at(2.0, {}), fast = frames_at(4.0, {});
+  ASSERT_GT(fast, slow);
+  const std::filesystem::path recording = folder.path() / "taken_away_3.mcap";
+  EXPECT_EQ(frames_at(2.0, folder.path()), slow);
+  const auto written = std::filesystem::last_write_time(recording);
+  EXPECT_EQ(frames_at(2.0, folder.path()), slow);
+  EXPECT_EQ(std::filesystem::last_write_time(recording), written) << "used again";
+  EXPECT_EQ(frames_at(4.0, folder.path()), fast) << "not those of the slower recording";
+  // What a stop leaves is no recording.
+  core::Cancellation stopped;
+  stopped.request();
+  std::filesystem::remove(recording);
+  EXPECT_EQ(evaluate_tracking({}, options, 3, pool, {}, &stopped).status().code(), core::StatusCode::kCancelled);
+  EXPECT_FALSE(std::filesystem::exists(recording));
+  EXPECT_EQ(frames_at(4.0, folder.path()), fast);
 }
 
 TEST(TrackingSuite, ACubeInAHandOfNoModelIsTrackedOrHonestlyNot) {

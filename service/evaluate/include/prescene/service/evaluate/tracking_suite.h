@@ -57,8 +57,8 @@ struct TrackingOptions {
   int sequences = 5;               ///< Of each kind.
   std::vector<std::string> kinds;  ///< Empty = all.
   double rate = 30.0;              ///< Frames a second.
-  /// Folder for the recordings and scene files, where those of the same scene and seed are used again; empty = they are
-  /// removed.
+  /// Folder for the recordings and scene files, where whole ones of the same scene, seed and rate are used again, and
+  /// others replaced; empty = they are removed.
   std::filesystem::path keep;
   rendering::LikelihoodChoice likelihood;
 };
