@@ -60,7 +60,7 @@ Result<bool> is_there(const fs::path& path) {
   return true;
 }
 
-/// The color.png files of a folder by name; none where there is no such folder.
+/// The frames of which a folder has the colour or the depth, by name; none where there is no such folder.
 Result<std::vector<FolderFrame>> list_without_poses(const fs::path& folder, const FrameFolderOptions& options) {
   PRESCENE_TRY(const bool there, is_there(folder));
   std::vector<fs::path> colors;
@@ -69,11 +69,16 @@ Result<std::vector<FolderFrame>> list_without_poses(const fs::path& folder, cons
     fs::directory_iterator entry(folder, error);
     if (error == std::errc::not_a_directory) return std::vector<FolderFrame>{};
     for (const fs::directory_iterator end; !error && entry != end; entry.increment(error)) {
-      if (entry->path().filename().string().ends_with(kColorSuffix)) colors.push_back(entry->path());
+      const std::string file_name = entry->path().filename().string();
+      for (const std::string_view suffix : {kColorSuffix, kDepthSuffix}) {
+        if (!file_name.ends_with(suffix)) continue;
+        colors.push_back(folder / (file_name.substr(0, file_name.size() - suffix.size()) + std::string(kColorSuffix)));
+      }
     }
   }
   if (error) return cannot_look(folder, error);
   std::sort(colors.begin(), colors.end());
+  colors.erase(std::unique(colors.begin(), colors.end()), colors.end());
   std::vector<FolderFrame> frames;
   for (const fs::path& color : colors) {
     const std::string file_name = color.filename().string();

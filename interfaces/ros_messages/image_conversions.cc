@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include "prescene/core/text.h"
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/images/raw_color.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
@@ -201,6 +202,14 @@ DepthImage read_depth(const RosImageView& image, double metres_per_unit, DepthIm
   return depth;
 }
 
+constexpr double kLeastMedian = 0.03;  // m: no depth camera measures that
+
+void doubt_small_depth(double least, double metres_per_unit, const char* encoding, DepthImageReport& report) {
+  if (report.measured == 0 || report.median_depth >= least) return;
+  report.warnings.push_back("the median depth is " + core::rounded_text(report.median_depth) + " m: is a unit of " +
+                            number_text(metres_per_unit) + " m right for this sender's " + encoding + "?");
+}
+
 }  // namespace
 
 RosImageView view_of(const RosImage& image) {
@@ -222,11 +231,8 @@ Result<DepthImage> to_depth_image(const RosImageView& image, const ImageRules& r
   if (image.encoding == "16UC1" || (image.encoding == "mono16" && rules.mono16_is_depth)) {
     PRESCENE_RETURN_IF_ERROR(check_layout(image, 2, rules));
     DepthImage depth = read_depth<std::uint16_t>(image, rules.metres_per_unit_16uc1, report);
-    // No depth camera measures a median of 3 cm; whole metres in 16 bits look like that.
-    if (report->measured > 0 && report->median_depth < 30.0 * rules.metres_per_unit_16uc1) {
-      report->warnings.push_back("the median depth is " + number_text(report->median_depth) + " m: is a unit of " +
-                                 number_text(rules.metres_per_unit_16uc1) + " m right for this sender's 16UC1?");
-    }
+    // Whole metres in 16 bits look like that.
+    doubt_small_depth(30.0 * rules.metres_per_unit_16uc1, rules.metres_per_unit_16uc1, "16UC1", *report);
     return depth;
   }
   if (image.encoding == "32FC1") {
@@ -238,6 +244,7 @@ Result<DepthImage> to_depth_image(const RosImageView& image, const ImageRules& r
           " m: does the sender put millimetres into 32FC1? Send metres, or set the unit of 32FC1 "
           "to 0.001");
     }
+    if (report->warnings.empty()) doubt_small_depth(kLeastMedian, rules.metres_per_unit_32fc1, "32FC1", *report);
     return depth;
   }
   const std::string remedy = image.encoding == "mono16" ? "allow it with the setting mono16_is_depth, or send 16UC1"

@@ -157,6 +157,10 @@ TEST_F(FrameFolders, WorkWithoutPoses) {
   EXPECT_EQ(opened->frames()[1].X_WC, geometry::Pose::identity());
   fs::remove(folder_ / "b.depth.png");
   EXPECT_THAT(message(), HasSubstr("b.depth.png: is missing"));
+  fs::remove(folder_ / "b.color.png");
+  EXPECT_EQ(message(), "");
+  fs::remove(folder_ / "a.color.png");
+  EXPECT_THAT(message(), HasSubstr("a.color.png: is missing for frame a")) << "not left out in silence";
 }
 
 TEST_F(FrameFolders, WhatCannotBeReadIsNotTakenForMissing) {

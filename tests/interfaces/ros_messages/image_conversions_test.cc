@@ -99,6 +99,8 @@ TEST(DepthImages, DoubtTheUnit) {
   ASSERT_TRUE(to_depth_image(to_ros_image_16uc1(ramp(0.002F, 0.0F), {}), {}, &report).ok());
   ASSERT_EQ(report.warnings.size(), 1U);
   EXPECT_THAT(report.warnings[0], HasSubstr("is a unit of 0.001 m right"));
+  ASSERT_TRUE(to_depth_image(to_ros_image_32fc1(ramp(0.8e-3F, 0.0F), {}), {}, &report).ok());
+  EXPECT_THAT(report.warnings, testing::ElementsAre(HasSubstr("is a unit of 1 m right for this sender's 32FC1")));
 }
 
 TEST(DepthImages, DoubtTheByteOrder) {
