@@ -175,6 +175,9 @@ void add_camera_options(CLI::App& verb, AssemblerSettings& assembler) {
   auto* group = verb.add_option_group("Camera", "Where the camera is");
   group->add_option("--world-frame", assembler.world_frame, "Frame of the scene in tf")
       ->check(utf8_text())
+      ->check([](const std::string& text) {
+        return std::string(text.empty() ? "the name of a frame is needed, not ''" : "");
+      })
       ->capture_default_str();
   group
       ->add_option_function<std::vector<double>>(

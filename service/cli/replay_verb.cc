@@ -29,7 +29,8 @@ core::Status check_options(const ReplayOptions& options) {
   }
   if (!(options.read.from < options.read.to))
     return core::invalid_input("--from " + core::rounded_text(options.read.from) + " is not before --to " +
-                               core::rounded_text(options.read.to) + ": exchange them");
+                               core::rounded_text(options.read.to) +
+                               (options.read.from > options.read.to ? ": exchange them" : ": give a later --to"));
   if (!interfaces::is_bag(options.input)) {
     for (const char* name : {"--from", "--to", "--all-parts"})
       if (given(name)) return core::invalid_input(std::string(name) + " is for recordings: leave it out");
