@@ -26,6 +26,19 @@ using belief::EventKind;
 constexpr double kSearchShare = 0.85;       // of the time, if it is limited
 constexpr std::size_t kPointsInHaste = 24;  // of a posterior, that are worked out when the time is out
 
+/// Such a frame tells of the camera, and its likelihood speaks against what should have been seen.
+void remark_on_blind_frames(const std::vector<WindowFrame>& frames, std::vector<std::string>& remarks) {
+  const auto is_blind = [](const WindowFrame& frame) {
+    const auto& depth = frame.observation.frame.depth;
+    return !depth || std::none_of(depth->data(), depth->data() + depth->size(), [](float z) { return z > 0.0F; });
+  };
+  const auto blind = std::count_if(frames.begin(), frames.end(), is_blind);
+  if (blind == 0) return;
+  remarks.push_back("In " + std::to_string(blind) + " of " + std::to_string(frames.size()) +
+                    " frames that were weighed, no pixel is measured: look whether the camera was covered, dazzled or "
+                    "too near. That a thing is not seen there is no sign that it was gone, whatever is said here.");
+}
+
 class Explainer {
  public:
   Explainer(const ExplainWindow& window, const ExplainQuery& query, const ExplainContext& context,
@@ -77,6 +90,7 @@ class Explainer {
     answer.cut_short = search.was_out_of_time();
     for (const auto* some : {&looked.remarks(), &remarks})
       answer.remarks.insert(answer.remarks.end(), some->begin(), some->end());
+    remark_on_blind_frames(frames_, answer.remarks);
     answer.remarks.emplace_back(
         "Intervals say how precisely the evidence was computed, not how well events are modelled.");
     return answer;

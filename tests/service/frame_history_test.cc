@@ -205,7 +205,9 @@ TEST(ControlLog, OfAPlacementThatBeganBeforeTheWindowKnowsTheRelease) {
 /// A recording that was tracked, whose frames are asked about.
 class TrackedRecording {
  public:
-  TrackedRecording(const std::filesystem::path& path, int threads) : pool_(threads), backends_(pool_) {
+  /// Of the frames after the first `sighted`, no pixel is kept.
+  TrackedRecording(const std::filesystem::path& path, int threads, int sighted = 1'000'000)
+      : pool_(threads), backends_(pool_) {
     ReplayInputOptions opened;
     opened.path = path;
     const auto input = ReplayInput::open(opened, {});
@@ -213,12 +215,18 @@ class TrackedRecording {
     if (!input) return;
     const auto tracker = Tracker::create(input->scene(), {}, 1, backends_);
     EXPECT_TRUE(tracker.ok());
-    const auto replayed = input->replay(**tracker, {}, {},
-                                        [&](const TrackerStep& step, const Tracker& at) -> core::Status {
-                                          history_.add(step.observation, at.belief());
-                                          return {};
-                                        },
-                                        {});
+    const auto replayed =
+        input->replay(**tracker, {}, {},
+                      [&](const TrackerStep& step, const Tracker& at) -> core::Status {
+                        belief::Observation kept = step.observation;
+                        if (sighted-- <= 0) {
+                          const geometry::PinholeCamera& camera = kept.frame.camera;
+                          kept.frame.depth = std::make_shared<geometry::DepthImage>(camera.width, camera.height, 0.0F);
+                        }
+                        history_.add(kept, at.belief());
+                        return {};
+                      },
+                      {});
     EXPECT_TRUE(replayed.ok()) << replayed.status().message();
   }
 
@@ -313,6 +321,21 @@ TEST(FrameHistory, ExplainsWithTheSameBitsOnAnyThreadsAndWhenAskedAgain) {
   EXPECT_FALSE(taken->answer.change);
   EXPECT_THAT(taken->answer.remarks,
               ::testing::Contains(HasSubstr("No smallest change is worked out of 'taken_away'")));
+}
+
+TEST(FrameHistory, SaysOfAnExplanationThatItsFramesShowNothing) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "box.mcap";
+  record_change(tests::box_on_table("0.8", ", normal: {position: [0.003, 0.003, 0]}"), {0.7, "box", std::nullopt},
+                path);
+  const auto remarks_of = [&](int sighted) {
+    TrackedRecording tracked(path, 1, sighted);
+    const auto found = tracked.explained(quick_question(0.4));
+    EXPECT_TRUE(found.ok()) << found.status().message();
+    return found ? found->answer.remarks : std::vector<std::string>();
+  };
+  EXPECT_THAT(remarks_of(1000), ::testing::Each(::testing::Not(HasSubstr("no pixel is measured"))));
+  EXPECT_THAT(remarks_of(5), ::testing::Contains(HasSubstr("no pixel is measured")));
 }
 
 /// What is told on the way, each with its explanations as text.
