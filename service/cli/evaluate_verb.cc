@@ -8,12 +8,15 @@
 #include "evaluate_folder.h"
 #include "output_files.h"
 #include "prescene/core/text.h"
+#include "prescene/service/evaluate/carried_cube.h"
 #include "prescene/service/evaluate/cleargrasp.h"
 #include "prescene/service/evaluate/credible_regions.h"
 #include "prescene/service/evaluate/cube_tosses.h"
+#include "prescene/service/evaluate/event_episodes.h"
 #include "prescene/service/evaluate/explained_events.h"
 #include "prescene/service/evaluate/finding.h"
 #include "prescene/service/evaluate/simulated_supports.h"
+#include "prescene/service/evaluate/suite_scenes.h"
 #include "prescene/service/evaluate/tracking_suite.h"
 #include "prescene/service/evaluate/ycb_video.h"
 #include "prescene/service/training/proposals_file.h"
@@ -48,6 +51,13 @@ const std::vector<std::string>& known_names() {
 
 bool is_known(const std::string& name) { return std::ranges::find(known_names(), name) != known_names().end(); }
 
+/// "a, b, c".
+std::string comma_list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
 /// kInvalidInput for an option that says nothing about this figure.
 core::Status check_options(const EvaluateOptions& options) {
   static const std::vector<std::pair<const char*, std::vector<std::string>>> kOptionsOf = {
@@ -67,9 +77,7 @@ core::Status check_options(const EvaluateOptions& options) {
   };
   for (const auto& [option, figures] : kOptionsOf) {
     if (options.verb->count(option) == 0 || std::ranges::find(figures, options.name) != figures.end()) continue;
-    std::string names;
-    for (const std::string& figure : figures) names += (names.empty() ? "" : ", ") + figure;
-    return core::invalid_input(std::string(option) + " is for " + names + ", not for " + options.name +
+    return core::invalid_input(std::string(option) + " is for " + comma_list(figures) + ", not for " + options.name +
                                ": leave it out");
   }
   return core::ok_status();
@@ -157,11 +165,11 @@ core::Status run_tracking(const EvaluateOptions& options, VerbContext& context) 
   TrackingOptions tracking = options.tracking;
   tracking.keep = options.keep;
   tracking.likelihood = options.likelihood;
+  if (options.data.empty() && tracking.kinds.empty())
+    core::log(context.log(), core::LogLevel::kInfo, "simulated sequences only: name the recorded data with --data");
   PRESCENE_TRY(const TrackingReport report,
                evaluate_tracking(options.data, tracking, context.options().seed, context.pool(),
                                  context.progress("evaluating tracking"), &context.cancellation()));
-  if (options.data.empty())
-    core::log(context.log(), core::LogLevel::kInfo, "simulated sequences only: name the recorded data with --data");
   context.print(to_json(report), table(table_of(report)));
   return core::ok_status();
 }
@@ -294,11 +302,14 @@ Verb add_evaluate_verb(CLI::App& app) {
   verb->add_option("--sequences", options->tracking.sequences, "Of tracking: sequences of each kind")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  verb->add_option("--kind", options->tracking.kinds, "Of tracking: only sequences of this kind (may be repeated)");
+  verb->add_option("--kind", options->tracking.kinds,
+                   "Of tracking: only sequences of this kind (may be repeated): " + comma_list(suite_kinds()) +
+                       "; with --data also " + kCarriedCube);
   verb->add_option("--episodes", options->explain.episodes, "Of explain: episodes, all kinds in turn")
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
-  verb->add_option("--event", options->explain.kinds, "Of explain: only episodes of this kind (may be repeated)");
+  verb->add_option("--event", options->explain.kinds,
+                   "Of explain: only episodes of this kind (may be repeated): " + comma_list(event_episode_kinds()));
   verb->add_option("--rate", options->tracking.rate, "Of tracking: simulated frames a second")
       ->check(number_between(1.0, 120.0))
       ->capture_default_str();

@@ -117,6 +117,8 @@ std::string scene_text(const Pose& X_WO) {
 
 }  // namespace
 
+core::Status check_carried_cube(const fs::path& folder) { return read_truth(folder / "truth.csv").status(); }
+
 core::Result<TrackingFigures> track_carried_cube(const fs::path& folder, std::uint64_t seed, Backends& backends,
                                                  const core::Cancellation& cancellation) {
   PRESCENE_TRY(const std::vector<TrueFrame> frames, read_truth(folder / "truth.csv"));

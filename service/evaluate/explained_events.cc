@@ -10,6 +10,7 @@
 #include <numbers>
 #include <optional>
 
+#include "kinds.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/order_statistics.h"
 #include "prescene/core/text.h"
@@ -250,9 +251,7 @@ core::Result<ExplainedEventsReport> evaluate_explained_events(const ExplainedEve
                                                               const core::ProgressSink& progress,
                                                               const core::Cancellation* cancellation) {
   const std::vector<std::string>& known = event_episode_kinds();
-  for (const std::string& kind : options.kinds)
-    if (std::find(known.begin(), known.end(), kind) == known.end())
-      return core::invalid_input("'" + kind + "' is no kind of episode");
+  PRESCENE_RETURN_IF_ERROR(check_kinds(options.kinds, known, "episode"));
   const std::vector<std::string>& kinds = options.kinds.empty() ? known : options.kinds;
   PRESCENE_TRY(const auto scratch, ScratchFolder::create());
   const core::Cancellation never;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "kinds.h"
 #include "prescene/core/clock.h"
 #include "prescene/core/order_statistics.h"
 #include "prescene/core/text.h"
@@ -224,18 +225,14 @@ core::Result<TrackingReport> evaluate_tracking(const fs::path& data, const Track
   const auto wanted = [&](const std::string& kind) {
     return options.kinds.empty() || std::find(options.kinds.begin(), options.kinds.end(), kind) != options.kinds.end();
   };
-  for (const std::string& kind : options.kinds) {
-    const std::vector<std::string>& kinds = suite_kinds();
-    if (kind != kCarriedCube && std::find(kinds.begin(), kinds.end(), kind) == kinds.end())
-      return core::invalid_input("'" + kind + "' is no kind of sequence: give one of " + kinds_text());
-    if (kind == kCarriedCube && data.empty())
-      return core::invalid_input(std::string(kCarriedCube) + " is of recorded data: name their folder (--data)");
-  }
-  // Before the simulated sequences, which take minutes.
-  std::error_code none;
-  if (!data.empty() && wanted(kCarriedCube) && !fs::is_directory(data / kCarriedCube, none))
-    return core::not_found((data / kCarriedCube).string() +
-                           ": there is no such folder: name the one that holds it (--data), or leave --data out");
+  std::vector<std::string> known = suite_kinds();
+  known.emplace_back(kCarriedCube);
+  PRESCENE_RETURN_IF_ERROR(check_kinds(options.kinds, known, "sequence"));
+  const bool cube = wanted(kCarriedCube) && !(data.empty() && options.kinds.empty());
+  if (cube && data.empty())
+    return core::invalid_input(std::string(kCarriedCube) + " is recorded: name the folder that holds it with --data");
+  // The simulated sequences come first and take long, so data that are not there are an error before them.
+  if (cube) PRESCENE_RETURN_IF_ERROR(check_carried_cube(data / kCarriedCube));
   PRESCENE_TRY(const auto scratch, ScratchFolder::create());
   fs::path folder = scratch->path();
   if (!options.keep.empty()) {
@@ -248,7 +245,6 @@ core::Result<TrackingReport> evaluate_tracking(const fs::path& data, const Track
   for (const std::string& kind : suite_kinds())
     if (wanted(kind))
       for (int k = 0; k < options.sequences; ++k) sequences.push_back({kind, seed + static_cast<std::uint64_t>(k)});
-  const bool cube = !data.empty() && wanted(kCarriedCube);
   const double parts = static_cast<double>(sequences.size()) + (cube ? options.sequences : 0);
 
   TrackingReport report;

@@ -125,8 +125,31 @@ TEST(TrackingSuite, TracksASequenceOfEachKindThatIsAskedFor) {
   EXPECT_GE(report->simulated.frames, 24);
   EXPECT_GT(report->simulated.visible, report->simulated.frames);  // two of the three objects stay
   EXPECT_FALSE(to_json(*report)["simulated"]["share_tracked"].is_null());
+}
+
+TEST(TrackingSuite, NamesTheKindsThatThereAre) {
+  core::ThreadPool pool(1);
+  TrackingOptions options;
   options.kinds = {"juggling"};
-  EXPECT_EQ(evaluate_tracking({}, options, 3, pool, {}, nullptr).status().code(), core::StatusCode::kInvalidInput);
+  const core::Status status = evaluate_tracking({}, options, 3, pool, {}, nullptr).status();
+  EXPECT_EQ(status.code(), core::StatusCode::kInvalidInput);
+  for (const std::string& kind : suite_kinds()) EXPECT_NE(status.message().find(kind), std::string::npos) << kind;
+}
+
+TEST(TrackingSuite, RecordedDataThatAreNotThereAreAnErrorBeforeAnythingIsSimulated) {
+  core::ThreadPool pool(1);
+  TrackingOptions options;
+  options.sequences = 1000;  // what would take a day
+  bool begun = false;
+  const core::ProgressSink progress = [&begun](const core::Progress&) { begun = true; };
+  const core::Status absent = evaluate_tracking("/nowhere", options, 1, pool, progress, nullptr).status();
+  EXPECT_FALSE(absent.ok());
+  EXPECT_NE(absent.message().find("/nowhere/carried_cube/truth.csv"), std::string::npos) << absent.message();
+  options.kinds = {"taken_away", kCarriedCube};
+  const core::Status unnamed = evaluate_tracking({}, options, 1, pool, progress, nullptr).status();
+  EXPECT_EQ(unnamed.code(), core::StatusCode::kInvalidInput);
+  EXPECT_NE(unnamed.message().find("--data"), std::string::npos) << unnamed.message();
+  EXPECT_FALSE(begun);
 }
 
 TEST(TrackingSuite, DataThatIsNotThereIsSaidBeforeTheWork) {

@@ -55,7 +55,7 @@ struct TrackingRow {
 
 struct TrackingOptions {
   int sequences = 5;               ///< Of each kind.
-  std::vector<std::string> kinds;  ///< Empty = all.
+  std::vector<std::string> kinds;  ///< Of suite_kinds(), or "carried_cube"; empty = all.
   double rate = 30.0;              ///< Frames a second.
   /// Folder for the recordings and scene files, where whole ones of the same scene, seed and rate are used again, and
   /// others replaced; empty = they are removed.
@@ -70,7 +70,8 @@ struct TrackingReport {
 
 /// `data`: folder that holds carried_cube; empty = simulated sequences only. Sequence k of a kind has seed `seed` + k,
 /// for the scene, the camera's noise and the tracker. The camera's noise differs from what the tracker assumes
-/// (suite_camera). Errors of files; kInvalidInput for kinds that are none.
+/// (suite_camera). Errors of files (of `data` before anything is simulated); kInvalidInput for kinds that are none, and
+/// for "carried_cube" without `data`.
 core::Result<TrackingReport> evaluate_tracking(const std::filesystem::path& data, const TrackingOptions& options,
                                                std::uint64_t seed, core::ThreadPool& threads,
                                                const core::ProgressSink& progress,
