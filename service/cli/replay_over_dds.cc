@@ -73,13 +73,16 @@ core::Status replay_over_dds(ReplayOptions& options, VerbContext& context) {
   TrackingScore score(input.scene());
   Backends backends(context.pool(), options.backends);
   SessionReport report(input.scene(), settings, backends);
-  ForeseenAndCame foreseen(input.scene(), first_topics(settings, *input.scene()).depth);
+  const std::string depth_topic = first_topics(settings, *input.scene()).depth;
+  std::size_t depth_images = 0;
+  ForeseenAndCame foreseen(input.scene(), depth_topic);
   DamagedRecords damaged;
   FinalStates states;
   PRESCENE_TRY(BusReplayResult result,
                replay_over_bus(options.input, options.bus, context.cancellation(), context.progress("replaying"),
                                context.log(), [&](const RecordedEntry& entry) {
                                  foreseen.add(entry);
+                                 if (!entry.is_json && entry.message.topic == depth_topic) ++depth_images;
                                  if (!entry.is_json || entry.message.topic != kTruthTopic) return;
                                  const std::string json(entry.message.cdr.begin(), entry.message.cdr.end());
                                  const auto truth = truth_from_json(json);
@@ -112,6 +115,9 @@ core::Status replay_over_dds(ReplayOptions& options, VerbContext& context) {
     core::log(context.log(), core::LogLevel::kInfo, "report written to " + options.report);
   }
   if (!result.loss.empty()) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + result.loss);
+  const bool is_whole = !options.bus.loop && !context.cancellation().requested();
+  if (const std::string unused = unused_frames_text(depth_images, result.beliefs.size()); is_whole && !unused.empty())
+    core::log(context.log(), core::LogLevel::kWarning, unused);
   if (damaged.count() > 0) core::log(context.log(), core::LogLevel::kWarning, options.input + ": " + damaged.text());
   warn_of_unchecked(options, result.unchecked, context);
   context.print({{"recording", options.input},

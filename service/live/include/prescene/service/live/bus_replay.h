@@ -3,6 +3,7 @@
 // questions.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -60,5 +61,9 @@ core::Result<BusReplayResult> replay_over_bus(const std::filesystem::path& path,
                                               const core::Cancellation& cancellation,
                                               const core::ProgressSink& progress, const core::LogSink& log,
                                               const std::function<void(const RecordedEntry&)>& on_entry = {});
+
+/// A sentence for a person if the service used less than half of the `frames` that were played, so that its poses and
+/// answers are worse than they could be; else empty. `beliefs`: how many came back.
+std::string unused_frames_text(std::size_t frames, std::size_t beliefs);
 
 }  // namespace prescene::service
