@@ -7,6 +7,7 @@
 
 #include "evaluate_folder.h"
 #include "output_files.h"
+#include "prescene/core/spelling.h"
 #include "prescene/core/text.h"
 #include "prescene/service/evaluate/carried_cube.h"
 #include "prescene/service/evaluate/cleargrasp.h"
@@ -51,13 +52,6 @@ const std::vector<std::string>& known_names() {
 
 bool is_known(const std::string& name) { return std::ranges::find(known_names(), name) != known_names().end(); }
 
-/// "a, b, c".
-std::string comma_list(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 /// kInvalidInput for an option that says nothing about this figure.
 core::Status check_options(const EvaluateOptions& options) {
   static const std::vector<std::pair<const char*, std::vector<std::string>>> kOptionsOf = {
@@ -77,8 +71,8 @@ core::Status check_options(const EvaluateOptions& options) {
   };
   for (const auto& [option, figures] : kOptionsOf) {
     if (options.verb->count(option) == 0 || std::ranges::find(figures, options.name) != figures.end()) continue;
-    return core::invalid_input(std::string(option) + " is for " + comma_list(figures) + ", not for " + options.name +
-                               ": leave it out");
+    return core::invalid_input(std::string(option) + " is for " + core::comma_list(figures) + ", not for " +
+                               options.name + ": leave it out");
   }
   return core::ok_status();
 }
@@ -303,13 +297,14 @@ Verb add_evaluate_verb(CLI::App& app) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   verb->add_option("--kind", options->tracking.kinds,
-                   "Of tracking: only sequences of this kind (may be repeated): " + comma_list(suite_kinds()) +
+                   "Of tracking: only sequences of this kind (may be repeated): " + core::comma_list(suite_kinds()) +
                        "; with --data also " + kCarriedCube);
   verb->add_option("--episodes", options->explain.episodes, "Of explain: episodes, all kinds in turn")
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
-  verb->add_option("--event", options->explain.kinds,
-                   "Of explain: only episodes of this kind (may be repeated): " + comma_list(event_episode_kinds()));
+  verb->add_option(
+      "--event", options->explain.kinds,
+      "Of explain: only episodes of this kind (may be repeated): " + core::comma_list(event_episode_kinds()));
   verb->add_option("--rate", options->tracking.rate, "Of tracking: simulated frames a second")
       ->check(number_between(1.0, 120.0))
       ->capture_default_str();

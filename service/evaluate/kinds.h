@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "prescene/core/spelling.h"
 #include "prescene/core/status.h"
 
 namespace prescene::service {
@@ -13,12 +14,9 @@ namespace prescene::service {
 /// kInvalidInput that lists `known` if one of `wanted` is not in it. `what`: "sequence".
 inline core::Status check_kinds(const std::vector<std::string>& wanted, const std::vector<std::string>& known,
                                 const std::string& what) {
-  for (const std::string& kind : wanted) {
-    if (std::find(known.begin(), known.end(), kind) != known.end()) continue;
-    std::string names;
-    for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
-    return core::invalid_input("'" + kind + "' is not a kind of " + what + ": use one of " + names);
-  }
+  for (const std::string& kind : wanted)
+    if (std::find(known.begin(), known.end(), kind) == known.end())
+      return core::invalid_input("'" + kind + "' is not a kind of " + what + ": use one of " + core::comma_list(known));
   return core::ok_status();
 }
 
