@@ -242,12 +242,18 @@ core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, con
   return found;
 }
 
+double origin_height(const MeshInspection& found, const geometry::RestingPose& pose) {
+  const auto& mass = found.mass ? found.mass : found.hull_mass;
+  return pose.height - (pose.R_WB * mass->p_BoBcm).z();
+}
+
 ordered_json to_json(const MeshInspection& found) {
   ordered_json poses = ordered_json::array();
   for (const geometry::RestingPose& pose : found.resting_poses) {
     const geometry::Quaterniond& R = pose.R_WB;
     poses.push_back({{"rotation", {{"quaternion_wxyz", {R.w(), R.x(), R.y(), R.z()}}}},
                      {"height", pose.height},
+                     {"origin_height", origin_height(found, pose)},
                      {"tip_angle_deg", pose.tip_angle * geometry::kDegreesPerRadian},
                      {"probability", pose.probability}});
   }

@@ -89,13 +89,13 @@ std::string text_of(const MeshInspection& found) {
   text += "symmetry: " + symmetry_text(found.symmetry) + "\n";
   if (!found.resting_poses.empty()) {
     std::vector<std::vector<std::string>> rows = {
-        {"lies with (body axis down)", "probability", "falls over at, deg", "height, mm"}};
+        {"lies with (body axis down)", "probability", "falls over at, deg", "centre of mass at, mm", "origin at, mm"}};
     for (std::size_t i = 0; i < std::min<std::size_t>(found.resting_poses.size(), 8); ++i) {
       const geometry::RestingPose& pose = found.resting_poses[i];
       const geometry::Vector3d down = pose.R_WB.inverse() * -geometry::Vector3d::UnitZ();
       rows.push_back({fixed_text(down.x(), 2) + " " + fixed_text(down.y(), 2) + " " + fixed_text(down.z(), 2),
                       fixed_text(pose.probability, 3), fixed_text(pose.tip_angle * 180.0 / std::numbers::pi, 1),
-                      fixed_text(1e3 * pose.height, 1)});
+                      fixed_text(1e3 * pose.height, 1), fixed_text(1e3 * origin_height(found, pose), 1)});
     }
     text += "\n" + table(rows);
     double rest = 0.0;

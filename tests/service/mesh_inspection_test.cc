@@ -3,7 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -111,6 +113,23 @@ TEST(MeshInspection, HollowThingsKeepTheirHollowUnlessSomebodyChoosesOtherwise) 
   EXPECT_THAT(chosen, testing::HasSubstr("with use: convex_hull nothing gets into that"));
   EXPECT_EQ(use_of(belief::MeshUse::kSpheres, &spheres), belief::MeshUse::kSpheres);
   EXPECT_EQ(spheres, "");
+}
+
+TEST(MeshInspection, OriginsAreAsHighAboveTheGroundAsTheLowestVertexIsBelowThem) {
+  const tests::ScratchDir folder;
+  // Its origin is outside of it, and its centre of mass elsewhere.
+  geometry::TriangleMesh cone = geometry::make_mesh(geometry::Cone{0.04, 0.1}, 24);
+  for (Vector3d& vertex : cone.vertices) vertex += Vector3d(0.03, -0.02, 0.2);
+  ASSERT_TRUE(interfaces::write_ply(folder.path() / "cone.ply", cone).ok());
+  const auto found = inspect_mesh(folder.path() / "cone.ply", {});
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  ASSERT_GE(found->resting_poses.size(), 2u);
+  for (const geometry::RestingPose& pose : found->resting_poses) {
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const Vector3d& vertex : cone.vertices) lowest = std::min(lowest, (pose.R_WB * vertex).z());
+    EXPECT_NEAR(origin_height(*found, pose), -lowest, 1e-6);
+  }
+  EXPECT_TRUE(to_json(*found)["resting_poses"][0].contains("origin_height"));
 }
 
 TEST(MeshInspection, CanBeStoppedAtEachStep) {

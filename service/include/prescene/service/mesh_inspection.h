@@ -57,6 +57,10 @@ struct MeshInspection {
 
 core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, const MeshInspectionOptions& options);
 
+/// m. How high the origin of the mesh's frame, which a scene's `position` is of, is above what the mesh lies on.
+/// `pose`: one of the inspection's.
+double origin_height(const MeshInspection& inspection, const geometry::RestingPose& pose);
+
 nlohmann::ordered_json to_json(const MeshInspection& inspection);
 /// A model file that scene files can name (docs/reference/scene_files.md): the mesh, mass properties and symmetry, with
 /// remarks as comments. `model_path` is where it will lie: the mesh is named relative to it. Fails with kInvalidInput
