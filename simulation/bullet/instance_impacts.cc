@@ -35,11 +35,8 @@ double InstanceWorld::rim_time(const SolverContact& c) const {
       if (!part.core || !part.core->rims()) continue;
       const Frame X_WS = moving_[static_cast<std::size_t>(body)].X_WO * part.X_OS;
       const Vector3d& rims = *part.core->rims();
-      const LeaningRim rim{X_WS.R.col(2), normal, side * spin};
-      if (!leans(rim)) continue;
-      const double z = rim.axis.dot(normal) > 0.0 ? rims.z() : rims.y();
-      const Vector3d lowest = X_WS.p + z * rim.axis + rims.x() * lowest_of(rim) - part.core->radius() * normal;
-      if ((own - lowest).norm() <= touching) first = std::min(first, roll_time(rim));
+      const RimPair pair{X_WS.p, rims.x(), rims.y(), rims.z(), part.core->radius()};
+      first = std::min(first, roll_time({X_WS.R.col(2), normal, side * spin}, pair, own, touching));
     }
   }
   return first;

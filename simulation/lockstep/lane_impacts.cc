@@ -31,13 +31,9 @@ double LaneEngine::rim_time(int slot, int body, const Vector3d& own, const Vecto
     const int at = state_.at(body, slot);
     const geometry::Matrix3d R = rotation(slot, body).toRotationMatrix();
     const Vector3d axis_P(part.R_PS[2], part.R_PS[5], part.R_PS[8]);
-    const LeaningRim rim{R * axis_P, normal, spin};
-    if (!leans(rim)) continue;
     const Vector3d middle_P = Vector3d(part.center.data()) - vector_at(state_.com, at);
-    const double z = rim.axis.dot(normal) > 0.0 ? -part.half[2] : part.half[2];
-    const Vector3d lowest =
-        vector_at(state_.p, at) + R * middle_P + z * rim.axis + part.half[0] * lowest_of(rim) - part.radius * normal;
-    if ((own - lowest).norm() <= scene_->options.touching_distance) first = std::min(first, roll_time(rim));
+    const RimPair rims{vector_at(state_.p, at) + R * middle_P, part.half[0], part.half[2], -part.half[2], part.radius};
+    first = std::min(first, roll_time({R * axis_P, normal, spin}, rims, own, scene_->options.touching_distance));
   }
   return first;
 }

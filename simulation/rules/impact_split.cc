@@ -44,6 +44,16 @@ double roll_time(const LeaningRim& rim) {
   return rate > 0.0 ? kSplitRoll / rate : std::numeric_limits<double>::infinity();
 }
 
+geometry::Vector3d lowest_of(const LeaningRim& rim, const RimPair& rims) {
+  const double z = rim.axis.dot(rim.normal) > 0.0 ? rims.lower : rims.upper;
+  return rims.middle + z * rim.axis + rims.radius * lowest_of(rim) - rims.rounding * rim.normal;
+}
+
+double roll_time(const LeaningRim& rim, const RimPair& rims, const geometry::Vector3d& point, double tolerance) {
+  if (!leans(rim) || (point - lowest_of(rim, rims)).norm() > tolerance) return std::numeric_limits<double>::infinity();
+  return roll_time(rim);
+}
+
 int parts_until(double time, double step, int left) {
   const double part = step / kStepParts;
   if (time >= part * left) return left;

@@ -68,6 +68,35 @@ TEST(ImpactSplit, ARimThatLeansTouchesWhereItIsLowest) {
   EXPECT_FALSE(leans({Vector3d::UnitX(), up, Vector3d::Zero()}));  // lies
 }
 
+// The support point of a thick disc, by trying all around both rims.
+TEST(ImpactSplit, ACylinderThatLeansTouchesWhereNoPointOfItsRimsIsLower) {
+  using geometry::Vector3d;
+  const Vector3d up = Vector3d(0.3, -0.2, 0.9).normalized();
+  const Vector3d aside = up.cross(Vector3d(0.1, 1.0, 0.4)).normalized();
+  for (const double lean : {0.05, 0.4, 0.7, 2.5, 3.0}) {
+    const Vector3d axis = std::cos(lean) * up + std::sin(lean) * aside;
+    const LeaningRim rim{axis, up, Vector3d(0.4, 2.0, -1.0)};
+    ASSERT_TRUE(leans(rim)) << lean;
+    const RimPair rims{{0.2, 0.1, -0.3}, 0.05, 0.09, -0.04, 0.003};
+    const Vector3d x = axis.cross(Vector3d::UnitX()).normalized(), y = axis.cross(x);
+    double lowest = kNever;
+    Vector3d where = Vector3d::Zero();
+    for (int i = 0; i < 100000; ++i) {
+      const double turn = 1e-5 * 2.0 * M_PI * i;
+      for (const double z : {rims.upper, rims.lower}) {
+        const Vector3d p =
+            rims.middle + z * axis + rims.radius * (std::cos(turn) * x + std::sin(turn) * y) - rims.rounding * up;
+        if (p.dot(up) < lowest) lowest = p.dot(up), where = p;
+      }
+    }
+    EXPECT_LT((lowest_of(rim, rims) - where).norm(), 1e-5) << lean;
+    EXPECT_EQ(roll_time(rim, rims, where, 1e-4), roll_time(rim)) << lean;
+    EXPECT_EQ(roll_time(rim, rims, where + 2e-4 * axis, 1e-4), kNever) << lean;
+  }
+  const RimPair flat{Vector3d::Zero(), 0.05, 0.01, -0.01, 0.001};
+  EXPECT_EQ(roll_time({up, up, aside}, flat, -0.011 * up, 1.0), kNever);  // stands
+}
+
 TEST(ImpactSplit, ARimIsRolledOverAsFastAsItTurnsBelowTheNormal) {
   using geometry::Vector3d;
   const Vector3d up = Vector3d::UnitZ();

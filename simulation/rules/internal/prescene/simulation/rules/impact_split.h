@@ -58,10 +58,24 @@ struct LeaningRim {
 };
 /// It touches with one point of the rim: neither flat with the cap nor with the side.
 bool leans(const LeaningRim& rim);
-/// The lowest point of a rim that leans, from its middle; unit.
+/// The direction from the middle of a rim that leans to its lowest point; unit.
 geometry::Vector3d lowest_of(const LeaningRim& rim);
 /// How long the lowest point of a rim that leans takes to go on by kSplitRoll, s.
 double roll_time(const LeaningRim& rim);
+
+/// The two rims of a cylinder with rounded edges.
+struct RimPair {
+  geometry::Vector3d middle;  ///< m: the point of the axis from which `upper` and `lower` count; frame of the rim.
+  double radius = 0.0;        ///< m: of the rims, without the rounding.
+  double upper = 0.0;         ///< m: where the rim is to which the axis points.
+  double lower = 0.0;         ///< m: where the other one is.
+  double rounding = 0.0;      ///< m: the surface is so far outside of the rims.
+};
+/// The lowest point of a cylinder that leans on the lower of its two rims, in the rim's frame, m.
+geometry::Vector3d lowest_of(const LeaningRim& rim, const RimPair& rims);
+/// How long a contact takes to go on along the rim by kSplitRoll, s. Infinite if the cylinder does not lean, or leans
+/// on another point than `point` (m, on its surface, in the rim's frame): they are farther apart than `tolerance` (m).
+double roll_time(const LeaningRim& rim, const RimPair& rims, const geometry::Vector3d& point, double tolerance);
 
 /// Whole parts of a step of `step` seconds that end before the first impact at `time`, at least one; `left`, those that
 /// are not yet taken, if it comes after them.
