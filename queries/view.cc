@@ -11,6 +11,7 @@
 #include "foresee.h"
 #include "prescene/belief/robot_motion.h"
 #include "prescene/rendering/surface_color.h"
+#include "prescene/simulation/rules/action_draws.h"
 #include "view.h"
 
 namespace prescene::queries {
@@ -23,10 +24,18 @@ constexpr double kMostlyShown = 0.5;
 /// What the duration of standing still is called, s.
 constexpr double kNow = 1e-3;
 
-std::vector<belief::Pose> robot_at(const belief::Scene& scene, double time) {
+/// Where the robot's bodies are `time` (s) after the start of one instance. Hands hold what they hold at this start as
+/// it is there, and go with it where this instance's actions take it. What a hand grasps later it takes where the start
+/// left it: only the ends of instances are kept.
+std::vector<belief::Pose> robot_at(const Foresight& foresight, const belief::WorldState& start, std::uint32_t instance,
+                                   const core::RandomStream& stream, double time) {
+  const belief::Scene& scene = *foresight.scene;
+  std::vector<belief::Action> actions = foresight.request.actions;
+  const auto drawn = simulation::draw_actions(actions, stream.at(0, instance));
+  for (std::size_t i = 0; i < actions.size(); ++i) simulation::fix_draws(drawn[i], actions[i]);
   std::vector<belief::Pose> X_WG;
   for (std::size_t i = 0; i < scene.robot.size(); ++i)
-    X_WG.push_back(belief::robot_pose_at(scene, scene.actions, static_cast<int>(i), time));
+    X_WG.push_back(belief::robot_pose_at(scene, actions, {&start, {}}, static_cast<int>(i), start.time + time));
   return X_WG;
 }
 
@@ -209,14 +218,13 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
   PRESCENE_TRY(const std::unique_ptr<rendering::Renderer> renderer, context.make_renderer());
   filter::MeshCache own_meshes;
   filter::MeshCache& meshes = context.meshes != nullptr ? *context.meshes : own_meshes;
-  const std::vector<belief::Pose> X_WG = robot_at(*foresight.scene, query.time);
   const std::vector<Look> looks = looks_of(*foresight.scene, prior);
   rendering::RenderOptions options;
   options.color = query.detail.color;
   std::vector<std::size_t> thing_of;  // by label - 1
   /// `is_there`: by object; null = all are.
-  const auto draw = [&](const belief::WorldState& state, const std::vector<char>* is_there,
-                        rendering::RenderedView* images) {
+  const auto draw = [&](const belief::WorldState& state, const std::vector<belief::Pose>& X_WG,
+                        const std::vector<char>* is_there, rendering::RenderedView* images) {
     filter::BeliefView drawn =
         filter::render_scene(*foresight.scene, state, X_WG, filter::MeshDetail::kDisplay, meshes);
     filter::BeliefView shown;
@@ -251,6 +259,7 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
   std::vector<char> is_there(foresight.scene->objects.size(), 1);
   // What moves in one way only is one instance; whether things are there is still drawn as often as was asked.
   const bool may_be_absent = std::ranges::any_of(prior.existence, [](double existence) { return existence < 1.0; });
+  const std::vector<simulation::StartSampler> samplers = simulation::samplers_of(prior.starts, prior.stream);
   const std::size_t instances = foresight.estimate.instances.size();
   const std::size_t asked = static_cast<std::size_t>(query.draws);
   const std::size_t rounds = may_be_absent && instances < asked ? asked / instances : 1;
@@ -261,7 +270,10 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
       return core::cancelled("stopped before all views were drawn: give more time, or a smaller camera image");
     core::RandomStream chance = prior.stream.for_purpose(core::Purpose::kScenario).at(n);
     for (std::size_t i = 0; i < is_there.size(); ++i) is_there[i] = chance.uniform() < prior.existence[i] ? 1 : 0;
-    const auto [drawn, status] = draw(record.final, &is_there, &images);
+    const belief::WorldState start = samplers[static_cast<std::size_t>(record.component)].draw(record.point);
+    const auto instance = static_cast<std::uint32_t>(n % instances);
+    const std::vector<belief::Pose> X_WG = robot_at(foresight, start, instance, prior.stream, query.time);
+    const auto [drawn, status] = draw(record.final, X_WG, &is_there, &images);
     PRESCENE_RETURN_IF_ERROR(status);
     const double share =
         (foresight.estimate.failed > 0 ? record.weight / followed : record.weight) / static_cast<double>(rounds);
@@ -276,7 +288,8 @@ core::Result<belief::ViewAnswer> view(const Prior& prior, const belief::ViewQuer
   }
   sums.put(*foresight.scene, prior, answer);
   options.color = false;
-  const auto [drawn, status] = draw(likeliest.final(), nullptr, &images);
+  const std::vector<belief::Pose> X_WG = robot_at(foresight, prior.likeliest, 0, prior.stream, query.time);
+  const auto [drawn, status] = draw(likeliest.final(), X_WG, nullptr, &images);
   PRESCENE_RETURN_IF_ERROR(status);
   if (query.detail.color) {
     for (std::size_t i = 0; i < drawn.names.size(); ++i)

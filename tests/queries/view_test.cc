@@ -141,6 +141,47 @@ TEST(View, HasMeanAndDeviationOfTheDepthFromAnyPose) {
   EXPECT_EQ(seen.objects[1].probability(20, 15), 0.0f);
 }
 
+// A hand goes where the object that it holds is taken, and it holds it where it is: 8 cm in front of the hand in the
+// likelier state and 10 cm in the other. The thing ends at x = -0.3, so that the hand ends at -0.22 or at -0.2, and not
+// between them where the mean of both would have it.
+TEST(View, AHandIsWhereItsObjectIsTakenInEachState) {
+  belief::Belief belief = two_hypotheses();
+  for (belief::Particle& particle : belief.objects[0].particles) {
+    particle.covariance.setZero();
+    particle.mode = belief::MotionMode::kHeld;
+  }
+  belief::Transport transport;
+  transport.object = "carton";
+  transport.X_WO = belief::FixedPose{Pose::from_translation({-0.3, 0.3, 0.1})};
+  transport.duration = 0.5;
+  ViewQuery query;
+  query.time = 1.0;
+  query.actions = {{0.0, transport}};
+  query.detail.spread = true;
+  query.X_WC = Pose{geometry::Quaterniond(0.0, 1.0, 0.0, 0.0), {-0.22, 0.3, 1.0}};
+  query.intrinsics = geometry::PinholeCamera{101, 101, 700.0, 700.0, 50.0, 50.0};
+  core::ThreadPool pool(1);
+  QueryContext context = context_with(slide, pool);
+  context.make_renderer = []() -> core::Result<std::unique_ptr<rendering::Renderer>> {
+    return rendering::make_reference_renderer();
+  };
+  const Answer answer = queries::answer(belief, {"", query}, context);
+  ASSERT_TRUE(answer.error.ok()) << answer.error.message();
+  const auto& seen = std::get<ViewAnswer>(answer.what);
+  double pixels = 0.0, sum_x = 0.0;
+  for (int y = 0; y < 101; ++y)
+    for (int x = 0; x < 101; ++x)
+      if (const std::uint16_t label = seen.labels(x, y); label != 0 && seen.label_names[label - 1U] == "hand") {
+        pixels += 1.0;
+        sum_x += x;
+      }
+  ASSERT_GT(pixels, 500.0);
+  EXPECT_NEAR(sum_x / pixels, 50.0, 0.5);
+  EXPECT_NEAR(seen.depth(50, 50), 0.68, 1e-3);  // the top of the ball of 2 cm
+  // 2.5 cm to the side the ball of the other state is alone.
+  EXPECT_NEAR((*seen.mean_depth)(75, 50), 0.25 * 0.68 + 0.75 * 1.0, 2e-3);
+}
+
 // Of 64 states, each without the object with probability 0.4: four standard errors are 0.25.
 TEST(View, AnObjectThatMayNotBeThereIsInAShareOfTheStates) {
   belief::Belief belief = two_hypotheses();
