@@ -24,6 +24,20 @@ constexpr double kNeverRefuted = 0.999;  // existence of what was seen for a sec
 constexpr int kPutDimensions = 7;
 constexpr int kRestFrames = 5;  // in which an object lay still, so that it is taken to go on so
 
+/// The heaviest of the particles on the side that has most of the weight: of those that are held, or of those that are
+/// not. The heaviest of all says little: in a hand some always move (filter::PredictOptions::wake_probability).
+const belief::Particle& heaviest_of_most(const std::vector<belief::Particle>& particles) {
+  double held = 0.0;
+  for (const belief::Particle& particle : particles)
+    held += particle.mode == belief::MotionMode::kHeld ? std::exp(particle.log_weight) : 0.0;
+  const belief::Particle* heaviest = nullptr;
+  for (const belief::Particle& particle : particles) {
+    if ((particle.mode == belief::MotionMode::kHeld) != (held > 0.5)) continue;
+    if (heaviest == nullptr || particle.log_weight > heaviest->log_weight) heaviest = &particle;
+  }
+  return heaviest != nullptr ? *heaviest : belief::heaviest(particles);
+}
+
 double to_uniform(double z) { return std::clamp(core::normal_cdf(z), 1e-12, 1.0 - 1e-12); }
 
 /// Ends instances at the window's end.
@@ -84,8 +98,13 @@ EventPaths::EventPaths(const ExplainWindow& window, const ExplainContext& contex
     alone_.push_back(std::move(one));
     shapes_.push_back(belief::collision_mesh(prior_.scene->model_of(objects_[i])));
     const belief::ObjectBelief& object = present_.objects[i];
-    const bool held = prior_.likeliest.objects[i].mode == belief::MotionMode::kHeld;
-    if (!held && object.motion.still_frames < kRestFrames) still_ = false;
+    belief::ObjectState& start = prior_.likeliest.objects[i];
+    if (prior_.scene->objects[i].held_by) {
+      const belief::Particle& of_most = heaviest_of_most(object.particles);
+      if ((of_most.mode == belief::MotionMode::kHeld) != (start.mode == belief::MotionMode::kHeld))
+        start = {of_most.X_WO, of_most.V_WO, of_most.mode, start.physical};
+    }
+    if (!is_held(i) && object.motion.still_frames < kRestFrames) still_ = false;
   }
 }
 

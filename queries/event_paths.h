@@ -105,6 +105,7 @@ class EventPaths {
   /// Nothing moves by itself in the window, and nothing is known to be done in it.
   bool is_still() const { return still_; }
   const SeenTrack& track(std::size_t object) const { return tracks_[object]; }
+  /// Whether particles that a hand holds have more than half of its weight at the start.
   bool is_held(std::size_t object) const;
   /// Probability that it is not there at the start: by its existence, but at least 1/2 of what the frame at the start
   /// leaves in doubt, and 1/2 of what the tracker has not found, or has lost.

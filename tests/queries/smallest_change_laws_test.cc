@@ -8,6 +8,8 @@
 #include <memory>
 #include <numbers>
 #include <numeric>
+#include <utility>
+#include <vector>
 
 #include "prescene/belief/belief.h"
 #include "prescene/geometry/angles.h"
@@ -118,6 +120,8 @@ struct OneThing {
   belief::ObjectModel model;
   Vector3d at;
   bool held = false;
+  /// Weights and modes of its particles. Empty: one, as `held` says.
+  std::vector<std::pair<double, belief::MotionMode>> modes = {};
 };
 
 class Event {
@@ -155,7 +159,12 @@ class Event {
     particle.covariance.diagonal().head<3>().setConstant(0.005 * 0.005);
     particle.covariance.diagonal().segment<3>(3).setConstant(0.002 * 0.002);
     particle.mode = thing.held ? belief::MotionMode::kHeld : belief::MotionMode::kResting;
-    believed.particles = {particle};
+    for (const auto& [weight, mode] : thing.modes) {
+      particle.log_weight = std::log(weight);
+      particle.mode = mode;
+      believed.particles.push_back(particle);
+    }
+    if (believed.particles.empty()) believed.particles = {particle};
     believed.motion.X_still = particle.X_WO;
     believed.motion.still_frames = 30;
     belief->scene = scene;
@@ -251,6 +260,23 @@ OneThing box_of(const Vector3d& size, const Vector3d& bottom, bool held) {
   thing.at = bottom + Vector3d(0.0, 0.0, 0.5 * size.z());
   thing.held = held;
   return thing;
+}
+
+// What is held may be held higher; what stands in reach of a hand may not.
+TEST(SmallestChange, AThingIsHeldIfMostOfItsParticlesAre) {
+  using belief::MotionMode;
+  const auto may_be_higher = [](std::vector<std::pair<double, MotionMode>> modes) {
+    OneThing box = box_of({0.06, 0.06, 0.1}, {0.0, 0.0, 0.2}, true);
+    box.modes = std::move(modes);
+    Event event(box, EventKind::kSlipped);
+    const std::vector<ChangeCoordinate>& coordinates = event.events().coordinates();
+    return std::any_of(coordinates.begin(), coordinates.end(),
+                       [](const ChangeCoordinate& one) { return one.name == "height of the place"; });
+  };
+  EXPECT_TRUE(may_be_higher({}));
+  // The heaviest particle is one of the few.
+  EXPECT_TRUE(may_be_higher({{0.4, MotionMode::kMoving}, {0.3, MotionMode::kHeld}, {0.3, MotionMode::kHeld}}));
+  EXPECT_FALSE(may_be_higher({{0.4, MotionMode::kHeld}, {0.3, MotionMode::kResting}, {0.3, MotionMode::kMoving}}));
 }
 
 /// By fresh draws that nothing had.
