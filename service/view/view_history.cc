@@ -52,6 +52,16 @@ std::optional<std::vector<std::size_t>> places_among(const std::vector<std::stri
   return places;
 }
 
+/// Runs are kept for long, and there are many: a name from the bus may have any length.
+std::string hand_of(const ObjectSummary& object) {
+  std::string hand = object.held_by.value_or("");
+  if (hand.size() <= ViewHistory::kMostHandBytes) return hand;
+  constexpr std::string_view kMore = "...";
+  std::size_t end = ViewHistory::kMostHandBytes - kMore.size();
+  while (end > 0 && (static_cast<unsigned char>(hand[end]) & 0xC0U) == 0x80U) --end;  // not within a character
+  return hand.substr(0, end).append(kMore);
+}
+
 }  // namespace
 
 /// The first of them, as many as there is room for.
@@ -137,7 +147,7 @@ bool ViewHistory::make_room_for(Objects objects, const std::vector<std::string>&
 void ViewHistory::add_runs(core::TimeNs stamp_ns, Objects objects, std::uint64_t index) {
   for (std::size_t i = 0; i < objects.size(); ++i) {
     const ObjectSummary& object = objects[i];
-    const std::string held_by = object.held_by.value_or("");
+    const std::string held_by = hand_of(object);
     const std::pair now(object.state, held_by);
     if (current_[i] == now) continue;
     current_[i] = now;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/core/utf8.h"
 #include "prescene/service/view/view_history.h"
 #include "tests/service/view/page_client.h"
 
@@ -196,6 +197,30 @@ TEST(ViewHistory, NoChangeIsLostWithTheRows) {
   EXPECT_EQ(history.runs()[3].held_by, "gripper");
   EXPECT_EQ(belief::json_text(to_json(history.runs()[3])), R"([0,700,70.0,"tracked","gripper"])");
   EXPECT_EQ(history.joined_runs(), 0U);
+}
+
+// Of a hand whose name is longer than the bound its beginning stands, in whole characters.
+TEST(ViewHistory, RunsKeepNoLongNames) {
+  const std::string umlauts = [] {
+    std::string text;
+    for (int i = 0; i < 1000; ++i) text += "\xC3\xA4";
+    return text;
+  }();
+  for (const std::string& name : {"x" + umlauts, umlauts, std::string(ViewHistory::kMostHandBytes + 1, 'x')}) {
+    ViewHistory history;
+    history.add(state_at(0, belief::TrackState::kTracked, name), 0);
+    history.add(state_at(1, belief::TrackState::kTracked, name), 1);
+    ASSERT_EQ(history.runs().size(), 1U);
+    const std::string& kept = history.runs()[0].held_by;
+    EXPECT_LE(kept.size(), ViewHistory::kMostHandBytes);
+    EXPECT_GE(kept.size(), ViewHistory::kMostHandBytes - 1);
+    EXPECT_TRUE(core::is_utf8(kept));
+    EXPECT_EQ(kept, name.substr(0, kept.size() - 3) + "...");
+  }
+  const std::string longest(ViewHistory::kMostHandBytes, 'x');
+  ViewHistory history;
+  history.add(state_at(0, belief::TrackState::kTracked, longest), 0);
+  EXPECT_EQ(history.runs()[0].held_by, longest);
 }
 
 // Whatever the states do: the runs are bounded, the first and the state that holds now are right, no two in a row are

@@ -23,6 +23,9 @@ class ViewHistory {
   explicit ViewHistory(std::size_t most_rows = 4000, std::size_t most_runs = 4000, std::size_t most_columns = 1024)
       : most_rows_(most_rows), most_runs_(most_runs), most_columns_(most_columns) {}
 
+  /// Bytes of a run's hand: of a longer name the beginning is kept, and "..." after it.
+  static constexpr std::size_t kMostHandBytes = 256;
+
   struct Row {
     std::uint64_t index = 0;
     double time = 0.0;           ///< s since the first row's stamp.
