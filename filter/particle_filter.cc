@@ -343,9 +343,10 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   std::vector<Island> islands;
   if (!first && !is_at_once) {
     islands = join_islands(belief, dt, result.counters);
-    PredictReport report = predict(belief, control, X_WG, dt, settings_.predict, simulators_,
-                                   core::RandomStream(belief.seed, core::Purpose::kProcessNoise), search_.threads(),
-                                   islands, seen_by_others(belief, observation.camera), &robot_bounds_);
+    const core::RandomStream stream(belief.seed, core::Purpose::kProcessNoise);
+    const PredictTools tools{simulators_, robot_bounds_, stream, search_.threads()};
+    PredictReport report = predict(belief, control, X_WG, dt, settings_.predict, tools, islands,
+                                   seen_by_others(belief, observation.camera));
     result.counters.pushed_particles = report.pushed;
     result.counters.simulated = report.simulated;
     result.counters.not_simulated = report.not_simulated;

@@ -147,8 +147,8 @@ void take_if_pushed(const belief::ObjectState& end, const Vector3d& gravity_W, c
 /// In worlds the other members are where they are in the particle's, and one simulation moves them all.
 void simulate(belief::Belief& belief, std::span<const Falling> falling, const Worlds& worlds,
               const std::vector<std::size_t>& objects, const std::vector<belief::Joint>& joints, double dt,
-              const PredictOptions& options, const simulation::Simulator& simulator, const core::RandomStream& stream,
-              core::ThreadPool& threads, PredictReport& report) {
+              const PredictOptions& options, const simulation::Simulator& simulator, const PredictTools& tools,
+              PredictReport& report) {
   belief::WorldState common;
   std::vector<belief::PhysicalSampler> physics;
   for (const std::size_t i : objects) {
@@ -157,7 +157,7 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const Wo
     physics.emplace_back(belief::model_of(belief, object), object.physics);
     common.objects.push_back({particle.X_WO, particle.V_WO, particle.mode, physics.back().mean()});
   }
-  const core::RandomStream parameters = stream.for_purpose(core::Purpose::kParameters);
+  const core::RandomStream parameters = tools.stream.for_purpose(core::Purpose::kParameters);
   const auto place_of = [&](std::size_t object) {
     return static_cast<std::size_t>(std::find(objects.begin(), objects.end(), object) - objects.begin());
   };
@@ -211,7 +211,7 @@ void simulate(belief::Belief& belief, std::span<const Falling> falling, const Wo
   request.actions = belief.pushes;
   for (belief::Action& push : request.actions) push.time -= dt - falling.front().duration;
   std::vector<belief::Trajectory> runs(starts.size());
-  simulator.run(starts, request, stream, 0, threads, runs);
+  simulator.run(starts, request, tools.stream, 0, tools.threads, runs);
   for (std::size_t i = 0; i < falling.size(); ++i) {
     ObjectBelief& object = belief.objects[falling[i].object];
     const std::size_t place = place_of(falling[i].object);
@@ -308,12 +308,11 @@ std::vector<std::vector<std::size_t>> neighbours_of(const belief::Belief& belief
 /// Moves falling particles whose surroundings are `objects`.
 void move_on_among(const std::vector<std::size_t>& objects, std::span<const Falling> falling, const Worlds& worlds,
                    const std::optional<belief::Support>& floor, std::span<const Pose> X_WG, double dt,
-                   const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                   const core::RandomStream& stream, core::ThreadPool& threads, belief::Belief& belief,
+                   const PredictOptions& options, const PredictTools& tools, belief::Belief& belief,
                    PredictReport& report) {
   belief::Scene scene = step_scene(belief, X_WG, dt, objects);
   if (floor) scene.supports.push_back(*floor);
-  const auto simulator = simulators(scene, 1.0);
+  const auto simulator = tools.simulators(scene, 1.0);
   if (!simulator) {
     const std::string why = "no simulator could be made: " + simulator.status().message();
     for (const Falling& f : falling) go_on_without_physics(f, why, belief, report);
@@ -324,7 +323,7 @@ void move_on_among(const std::vector<std::size_t>& objects, std::span<const Fall
     std::size_t end = begin;
     while (end < falling.size() && falling[end].duration == falling[begin].duration) ++end;
     simulate(belief, falling.subspan(begin, end - begin), worlds, objects, scene.joints, dt, options, **simulator,
-             stream, threads, report);
+             tools, report);
     begin = end;
   }
 }
@@ -371,9 +370,7 @@ void keep_joints_of_present(belief::Scene& scene) {
 }
 
 PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, const Worlds& worlds,
-                      std::span<const Pose> X_WG, double dt, const PredictOptions& options,
-                      const simulation::SimulatorFactory& simulators, const core::RandomStream& stream,
-                      core::ThreadPool& threads) {
+                      std::span<const Pose> X_WG, double dt, const PredictOptions& options, const PredictTools& tools) {
   PredictReport report;
   if (falling.empty()) return report;
   const std::optional<belief::Support> floor = last_floor(falling, belief);
@@ -386,8 +383,8 @@ PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, cons
     const std::vector<std::size_t>& objects = neighbours[falling[begin].object];
     std::size_t end = begin;
     while (end < falling.size() && neighbours[falling[end].object] == objects) ++end;
-    move_on_among(objects, std::span(falling).subspan(begin, end - begin), worlds, floor, X_WG, dt, options, simulators,
-                  stream, threads, belief, report);
+    move_on_among(objects, std::span(falling).subspan(begin, end - begin), worlds, floor, X_WG, dt, options, tools,
+                  belief, report);
     begin = end;
   }
   return report;

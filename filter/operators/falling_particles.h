@@ -68,8 +68,6 @@ void keep_joints_of_present(belief::Scene& scene);
 
 /// Moves all falling particles on to the end of the step: by physics where that can be done, else at constant velocity.
 PredictReport move_on(belief::Belief& belief, std::vector<Falling> falling, const Worlds& worlds,
-                      std::span<const Pose> X_WG, double dt, const PredictOptions& options,
-                      const simulation::SimulatorFactory& simulators, const core::RandomStream& stream,
-                      core::ThreadPool& threads);
+                      std::span<const Pose> X_WG, double dt, const PredictOptions& options, const PredictTools& tools);
 
 }  // namespace prescene::filter

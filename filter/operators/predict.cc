@@ -288,16 +288,15 @@ void drift(Particle& particle, const Vector3d& p_OQ, double dt, double velocity_
 }
 
 PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
-                      const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                      const core::RandomStream& stream, core::ThreadPool& threads, std::span<const Island> islands,
-                      const std::vector<bool>& keeps_modes, RobotBounds* robot_bounds) {
+                      const PredictOptions& options, const PredictTools& tools, std::span<const Island> islands,
+                      const std::vector<bool>& keeps_modes) {
   PRESCENE_CHECK(belief.objects.size() == belief.scene->objects.size());
   PRESCENE_CHECK(X_WG.size() == belief.scene->robot.size() && belief.robot.size() == X_WG.size());
   PRESCENE_CHECK(dt > 0.0);
   apply_grasps(control, belief);
   begin_pushes(control, dt, belief);
-  RobotBounds of_this_step;
-  const std::vector<Mover> movers = movers_of(belief, X_WG, dt, robot_bounds != nullptr ? *robot_bounds : of_this_step);
+  const std::vector<Mover> movers = movers_of(belief, X_WG, dt, tools.robot_bounds);
+  const auto has_physics = static_cast<bool>(tools.simulators);
 
   Worlds worlds = worlds_of(belief, islands);
   std::vector<Falling> falling;
@@ -306,16 +305,16 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     const bool tracked = object.state == belief::TrackState::kTracked;
     const std::optional<int> hand = holder_of(*belief.scene, static_cast<int>(i));
     const std::optional<double> released = release_time(control, *belief.scene, object.name, dt);
-    core::RandomStream draws = stream.at(belief.step, static_cast<std::uint32_t>(i));
+    core::RandomStream draws = tools.stream.at(belief.step, static_cast<std::uint32_t>(i));
     std::vector<bool> smooth(object.particles.size(), false);
     const bool seen = tracked || object.state == belief::TrackState::kDoubtful;
     if (i >= keeps_modes.size() || !keeps_modes[i])
-      change_modes(options, seen, tracked, hand.has_value(), static_cast<bool>(simulators), dt, draws, smooth, object);
+      change_modes(options, seen, tracked, hand.has_value(), has_physics, dt, draws, smooth, object);
     WorldsOfIsland* const island = worlds.of(i);
     if (island != nullptr) island->begin(i, released.has_value(), object);
     const Vector3d centre = centre_of(*belief.scene, object);
     // Physics says whether what rests is touched. Of what is seen some particles stay: the frame tells, too.
-    const bool may_be_pushed = simulators && is_present(object) && !movers.empty();
+    const bool may_be_pushed = has_physics && is_present(object) && !movers.empty();
     const double radius = may_be_pushed ? radius_of(*belief.scene, object) : 0.0;
     for (std::size_t k = 0; k < object.particles.size(); ++k) {
       Particle& particle = object.particles[k];
@@ -350,7 +349,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
         const bool goes_on = tracked && !released && is_slow(particle) && (smooth[k] || smooth_draw < kSmoothShare);
         drift(particle, centre, left, tracked ? options.velocity_keep : options.unseen_velocity_keep,
               goes_on ? scaled(options.moving, kSmoothNoise) : options.moving);
-        if (simulators && !idle && is_present(object) && physics_draw < physics_share) {
+        if (has_physics && !idle && is_present(object) && physics_draw < physics_share) {
           falling.push_back({i, k, left, particle.X_WO, particle.V_WO});
           particle.X_WO = before.X_WO;  // physics moves the mean; the spread grows alike
           particle.V_WO = before.V_WO;
@@ -372,7 +371,7 @@ PredictReport predict(belief::Belief& belief, const belief::Control& control, st
     combine_weights(island.members, island.log_weights, belief);
     island.fall_together(belief, falling);
   }
-  PredictReport report = move_on(belief, std::move(falling), worlds, X_WG, dt, options, simulators, stream, threads);
+  PredictReport report = move_on(belief, std::move(falling), worlds, X_WG, dt, options, tools);
   end_pushes(dt, belief);
   belief.robot.assign(X_WG.begin(), X_WG.end());
   return report;

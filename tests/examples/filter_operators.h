@@ -154,6 +154,7 @@ extern const belief::Control control;
 extern const std::vector<Pose> X_WG;
 extern const PredictOptions predicting;
 extern const simulation::SimulatorFactory simulators;
+extern RobotBounds bounds;
 extern const std::vector<double> log_weights_before;
 }  // namespace worlds_h
 

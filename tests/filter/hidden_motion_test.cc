@@ -16,6 +16,7 @@ using belief::Particle;
 using filter::MotionNoise;
 using filter::predict;
 using filter::PredictOptions;
+using filter::RobotBounds;
 using geometry::Vector3d;
 
 constexpr double kStep30Hz = 1.0 / 30.0;
@@ -48,10 +49,11 @@ class OutOfSight : public ::testing::Test {
     for (std::size_t frame = first + 1; frame <= last; ++frame) {
       belief.stamp_ns = truths[frame].stamp_ns;
       ++belief.step;
-      predict(belief, {}, truths[frame].robot, kStep30Hz, {}, push_simulators(),
-              {belief.seed, core::Purpose::kProcessNoise}, threads_);
+      predict(belief, {}, truths[frame].robot, kStep30Hz, {},
+              {push_simulators(), bounds_, {belief.seed, core::Purpose::kProcessNoise}, threads_});
     }
   }
+  RobotBounds bounds_;
   core::ThreadPool threads_{2};
 };
 
@@ -111,8 +113,8 @@ TEST_F(OutOfSight, APushOfAControlGoesOnUntilItsEnd) {
   belief.robot = truths[0].robot;
   for (int frame = 1; frame <= 45; ++frame) {
     ++belief.step;
-    predict(belief, control, truths[0].robot, kStep30Hz, {}, push_simulators(), {2, core::Purpose::kProcessNoise},
-            threads_);
+    predict(belief, control, truths[0].robot, kStep30Hz, {},
+            {push_simulators(), bounds_, {2, core::Purpose::kProcessNoise}, threads_});
     control = {};
     const double left = 0.5 * kStep30Hz + finger.duration - frame * kStep30Hz;
     ASSERT_EQ(belief.pushes.size(), left > 0.0 ? 1u : 0u) << frame;

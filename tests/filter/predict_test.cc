@@ -80,8 +80,10 @@ class Predict : public ::testing::Test {
   PredictReport run(belief::Belief& belief, const Pose& X_WG, double dt, const PredictOptions& options,
                     const belief::Control& control = {}, const simulation::SimulatorFactory& simulators = {}) {
     const Pose poses[] = {X_WG};
-    return predict(belief, control, poses, dt, options, simulators, {3, core::Purpose::kProcessNoise}, threads_);
+    return predict(belief, control, poses, dt, options, {simulators, bounds_, stream_, threads_});
   }
+  const core::RandomStream stream_{3, core::Purpose::kProcessNoise};
+  RobotBounds bounds_;
   core::ThreadPool threads_{2};
 };
 
@@ -133,7 +135,7 @@ TEST_F(Predict, WhatNothingNewIsSeenOfKeepsItsModesAndWeights) {
   const std::vector<bool> keeps = {true};
   for (int step = 0; step < 100; ++step) {
     ++belief.step;
-    predict(belief, {}, poses, 1.0 / 30.0, {}, {}, {3, core::Purpose::kProcessNoise}, threads_, {}, keeps);
+    predict(belief, {}, poses, 1.0 / 30.0, {}, {{}, bounds_, stream_, threads_}, {}, keeps);
   }
   for (std::size_t i = 0; i < 16; ++i) {
     EXPECT_EQ(belief.objects[0].particles[i].mode, i < 8 ? MotionMode::kMoving : MotionMode::kResting) << i;

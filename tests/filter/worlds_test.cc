@@ -190,8 +190,9 @@ TEST(PredictWorlds, NoneHasItsMembersInsideEachOther) {
   core::ThreadPool threads(2);
   const auto predicted = [&](std::span<const Island> islands, PredictReport* report) {
     Belief belief = start;
-    *report =
-        predict(belief, {}, {}, 0.05, options, push_simulators(), {3, core::Purpose::kProcessNoise}, threads, islands);
+    RobotBounds bounds;
+    *report = predict(belief, {}, {}, 0.05, options,
+                      {push_simulators(), bounds, {3, core::Purpose::kProcessNoise}, threads}, islands);
     EXPECT_EQ(report->not_simulated, 0) << report->failure;
     return belief;
   };

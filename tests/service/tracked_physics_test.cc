@@ -58,8 +58,10 @@ TEST(TrackedPhysics, FallsFarFromTheOriginAsNearIt) {
       filter::PredictOptions options;
       options.settle_probability = 0.0;
       options.physics_share = 1.0;
-      const auto report = filter::predict(belief, {}, {}, 0.1, options, backends.simulator_factory(),
-                                          {1, core::Purpose::kProcessNoise}, pool);
+      filter::RobotBounds bounds;
+      const auto report =
+          filter::predict(belief, {}, {}, 0.1, options,
+                          {backends.simulator_factory(), bounds, {1, core::Purpose::kProcessNoise}, pool});
       EXPECT_EQ(report.simulated, static_cast<int>(belief.objects[0].particles.size())) << report.failure;
       for (const belief::Particle& particle : belief.objects[0].particles) {
         EXPECT_NEAR(particle.V_WO.linear.z(), -0.981, 1e-4);
@@ -81,8 +83,10 @@ TEST(TrackedPhysics, WhatIsNotSeenFallsNoFurtherThanTheLowestSurfaceThatWas) {
     belief.lowest_seen = lowest;
     belief.objects[0].state = belief::TrackState::kUnseen;
     for (int frame = 0; frame < 60; ++frame) {
-      const auto report = filter::predict(belief, {}, {}, 1.0 / 30.0, {}, backends.simulator_factory(),
-                                          {1, core::Purpose::kProcessNoise}, pool);
+      filter::RobotBounds bounds;
+      const auto report =
+          filter::predict(belief, {}, {}, 1.0 / 30.0, {},
+                          {backends.simulator_factory(), bounds, {1, core::Purpose::kProcessNoise}, pool});
       EXPECT_EQ(report.not_simulated, 0) << report.failure;
       ++belief.step;
     }

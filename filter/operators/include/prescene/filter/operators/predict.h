@@ -3,7 +3,8 @@
 // goes on at constant velocity or falls by the laws of physics (a part of the particles each, the frame decides); some
 // particles change their mode. What physics cannot do goes on at constant velocity, and the report says so.
 //
-//   PredictReport report = predict(belief, control, X_WG_now, dt, options, simulators, stream, pool);
+//   RobotBounds bounds;                                          // one for all steps
+//   PredictReport report = predict(belief, control, X_WG_now, dt, options, {simulators, bounds, stream, pool});
 #pragma once
 
 #include <optional>
@@ -89,25 +90,30 @@ class RobotBounds {
   std::vector<Known> known_;
 };
 
+/// What predict() works with.
+struct PredictTools {
+  /// Called once for each group of objects that may touch in the step, with a scene of these objects, and shapes should
+  /// come from a cache; empty = none, then everything that moves does so at constant velocity.
+  const simulation::SimulatorFactory& simulators;
+  RobotBounds& robot_bounds;         ///< Kept from step to step.
+  const core::RandomStream& stream;  ///< Draws of a step are those at the belief's step number.
+  core::ThreadPool& threads;
+};
+
 /// Steps `belief` from its robot poses and stamp to `X_WG` and `dt` later (s, > 0). Actions of the control act at their
-/// times within the step. Weights change with modes.
+/// times within the step. Weights change with modes. A particle whose simulator can't be made, or whose run does not
+/// last for the whole step or ends where nothing can be, goes on at constant velocity like those that are not meant for
+/// physics.
 ///
-/// `simulators` is called once for each group of objects that may touch in this step, with a scene of these objects,
-/// and shapes should come from a cache; empty = none, then everything that moves does so at constant velocity. A
-/// particle whose simulator can't be made, or whose run does not last for the whole step or ends where nothing can be,
-/// goes on at constant velocity like those that are not meant for physics.
-///
-/// `islands`: those whose particles are worlds (checked). What moves in a world is simulated together, from where every
-/// member is in it, or not at all; what rests there and is pushed begins to move. In a step in which a member is
-/// released each is for itself.
+/// `X_WG`: of all robot bodies, in the scene's order. `islands`: those whose particles are worlds (checked). What moves
+/// in a world is simulated together, from where every member is in it, or not at all; what rests there and is pushed
+/// begins to move. In a step in which a member is released each is for itself.
 ///
 /// `keeps_modes`: by object; those of which nothing new is seen, so that whatever their particles do they go on doing.
-///
-/// `robot_bounds`: kept from step to step; null = worked out in this one. The result is the same.
+/// Those beyond its end may change their modes.
 PredictReport predict(belief::Belief& belief, const belief::Control& control, std::span<const Pose> X_WG, double dt,
-                      const PredictOptions& options, const simulation::SimulatorFactory& simulators,
-                      const core::RandomStream& stream, core::ThreadPool& threads, std::span<const Island> islands = {},
-                      const std::vector<bool>& keeps_modes = {}, RobotBounds* robot_bounds = nullptr);
+                      const PredictOptions& options, const PredictTools& tools, std::span<const Island> islands = {},
+                      const std::vector<bool>& keeps_modes = {});
 
 /// One particle at constant velocity about the centre p_OQ for dt, its covariance grown by the noise.
 void drift(belief::Particle& particle, const Vector3d& p_OQ, double dt, double velocity_keep, const MotionNoise& noise);

@@ -6,7 +6,7 @@
 //
 //   const std::vector<Island> islands = islands_that_change(belief, dt, options, touch, pool);
 //   for (const Island& island : islands) join_worlds(island, resampling, stream, belief);
-//   predict(belief, control, X_WG, dt, predicting, simulators, stream, pool, islands);
+//   predict(belief, control, X_WG, dt, predicting, {simulators, bounds, stream, pool}, islands);
 //   for (const Island& island : islands) combine_weights(island, log_weights_before, belief);  // weighed in between
 //   for (const Island& island : islands) resample_worlds(island, resampling, stream, belief);
 //
