@@ -129,8 +129,8 @@ bool operator==(const Belief& a, const Belief& b);
 /// What a user wants to know of one object.
 struct ObjectEstimate {
   Pose mean;  ///< Weighted mean about the heaviest particle, up to symmetry.
-  Matrix6d covariance =
-      Matrix6d::Zero();  ///< Of the whole mixture, order (rotation, translation) as geometry::box_plus.
+  /// Of the whole mixture, order (rotation, translation) as geometry::box_plus.
+  Matrix6d covariance = Matrix6d::Zero();
   Twist twist;
   Pose mode;  ///< The heaviest particle's pose.
   MotionMode motion = MotionMode::kMoving;

@@ -61,8 +61,8 @@ struct RenderMesh {
   MeshClusters clusters;                                ///< The same once more, triangles in the same order.
   Vector3f centre = Vector3f::Zero();                   ///< Of a bounding sphere, mesh frame.
   float radius = 0.0f;                                  ///< Of that sphere, metres.
-  bool closed =
-      false;  ///< Watertight and consistently oriented: faces seen from behind are never visible from outside.
+  /// Watertight and consistently oriented: faces seen from behind are never visible from outside.
+  bool closed = false;
   MeshLook look;
   UniqueNumber number;  ///< By which devices know what they have already.
 };

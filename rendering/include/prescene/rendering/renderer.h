@@ -37,8 +37,8 @@ struct RenderOptions {
 struct RenderedView {
   geometry::DepthImage depth;   ///< z in C, metres; 0 = nothing.
   geometry::LabelImage labels;  ///< 1 + index of the instance; 0 = nothing.
-  geometry::Image<Vector3f>
-      normals;                 ///< Unit, in C, of the flat triangle, turned towards the camera; empty unless asked.
+  /// Unit, in C, of the flat triangle, turned towards the camera; empty unless asked.
+  geometry::Image<Vector3f> normals;
   geometry::ColorImage color;  ///< sRGB: the surface's own colour (MeshLook, else the material's) by Lambert's law from
                                ///< the flat triangle's normal; empty unless asked.
 };

@@ -50,8 +50,8 @@ struct ParticleWeight {
   bool hidden = false;
 };
 
-inline constexpr double kSupportAround =
-    2.5;  ///< Radii of an object; so far around it its support's height is measured.
+/// Radii of an object; so far around it its support's height is measured.
+inline constexpr double kSupportAround = 2.5;
 /// Share of an object that may be inside of something solid, as poses have errors, too: of what is found or turned, no
 /// more may be; of a particle, more counts as all.
 inline constexpr double kMostInSupport = 0.25;

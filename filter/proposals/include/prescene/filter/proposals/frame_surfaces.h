@@ -48,8 +48,8 @@ struct Surroundings {
   SupportSurfaces steps;  ///< Small level patches: objects may stand on these too, or be what the patch belongs to.
   /// Of the sampled camera's size: 0 where the frame may show an object, else what it shows, a Shown.
   geometry::Image<std::uint8_t> background;
-  geometry::Image<std::uint8_t>
-      over_support;  ///< Likewise: an Over, which says what a pixel is at most max_height above.
+  /// Likewise: an Over, which says what a pixel is at most max_height above.
+  geometry::Image<std::uint8_t> over_support;
 };
 enum Over : std::uint8_t {
   kNoSupport = 0,

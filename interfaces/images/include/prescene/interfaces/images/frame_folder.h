@@ -28,8 +28,8 @@ struct FrameFolderOptions {
   double metres_per_unit = 0.001;   ///< Of the depth PNGs.
   double frames_per_second = 30.0;  ///< Stamps frames without stamp_ns.
   std::int64_t first_stamp_ns = 0;
-  std::optional<geometry::PinholeCamera> camera =
-      std::nullopt;  ///< Needed where the folder has no intrinsics.K.txt; otherwise ignored.
+  /// Needed where the folder has no intrinsics.K.txt; otherwise ignored.
+  std::optional<geometry::PinholeCamera> camera = std::nullopt;
   ImageLimits limits = {};
 };
 

@@ -126,8 +126,8 @@ struct ReportSection {
 struct ReportContents {
   std::string title;
   std::string subtitle;
-  std::vector<std::pair<std::string, std::string>>
-      facts;  ///< Name and value, shown at the top: file, seed, instances...
+  /// Name and value, shown at the top: file, seed, instances...
+  std::vector<std::pair<std::string, std::string>> facts;
   std::vector<ReportSection> sections;
 };
 

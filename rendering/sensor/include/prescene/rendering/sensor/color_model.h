@@ -41,8 +41,7 @@ struct ColorModelOptions {
   /// bins. Standard deviation of the Gaussian that both histograms are smoothed by. Range 0 to 8. Chosen.
   double smoothing_bins = 1.0;
   /// share. Of both distributions, this share is spread over all bins: a colour seen in neither says nothing. Range 0
-  /// to
-  /// 1. Chosen.
+  /// to 1. Chosen.
   double uniform_share = 0.02;
   /// factor. Ratios are clipped to [1 / this, this]. Range 1 to 10000. Chosen.
   double max_ratio = 20.0;

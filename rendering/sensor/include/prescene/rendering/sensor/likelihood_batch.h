@@ -108,8 +108,8 @@ struct PoseHypothesis {
 
 /// What the frame says about one hypothesis. Counts are of reduced pixels.
 struct PoseEvidence {
-  double log_ratio =
-      0.0;  ///< Sum over pixels of log p(frame | object there) - log p(frame | absent). 0: nothing to see.
+  /// Sum over pixels of log p(frame | object there) - log p(frame | absent). 0: nothing to see.
+  double log_ratio = 0.0;
   double tempered = 0.0;           ///< tempering(frame.tempering.weight, tempering pixels, frame.step) * log_ratio.
   int in_view = 0;                 ///< Pixels that the object covers, known surfaces in front or not.
   int covered = 0;                 ///< Of these, not hidden by a known surface.

@@ -106,8 +106,8 @@ struct TemperingOptions {
 struct PixelGeometry {
   double depth = 0.0;   ///< Of the predicted surface, z in C, metres, > min_depth to be seen.
   double cosine = 1.0;  ///< |n . ray| of unit vectors.
-  double outline_px =
-      std::numeric_limits<double>::infinity();  ///< Distance to the object's outline, full-image pixels.
+  /// Distance to the object's outline, full-image pixels.
+  double outline_px = std::numeric_limits<double>::infinity();
 };
 
 /// The distribution of one pixel's return on a predicted surface: missing with probability `missing`, else a mixture

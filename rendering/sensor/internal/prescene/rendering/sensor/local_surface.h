@@ -13,8 +13,8 @@ namespace prescene::rendering {
 
 struct LocalSurfaceOptions {
   int window = 3;  ///< Pixels each way.
-  double same_surface =
-      0.015;            ///< m; neighbours further than this from a plane through their middle are of another surface.
+  /// m; neighbours further than this from a plane through their middle are of another surface.
+  double same_surface = 0.015;
   double fewest = 0.5;  ///< Share of the window's pixels that must be measured, of one surface.
 };
 

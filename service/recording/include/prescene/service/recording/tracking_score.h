@@ -18,8 +18,8 @@ struct ObjectTrackingScore {
   std::string object;
   int frames = 0;          ///< With an estimate and a truth.
   int visible_frames = 0;  ///< At least half of it seen.
-  double median_position_error =
-      0.0;  ///< m, over visible frames, of the origin (on the axis' line for continuous symmetry).
+  /// m, over visible frames, of the origin (on the axis' line for continuous symmetry).
+  double median_position_error = 0.0;
   double p90_position_error = 0.0;
   double median_turn_error = 0.0;        ///< rad, modulo the model's symmetry.
   double share_tracked = 0.0;            ///< Visible frames in state tracked.

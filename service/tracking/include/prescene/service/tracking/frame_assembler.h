@@ -64,8 +64,8 @@ struct AssembledFrame {
   MessageIndex camera_info = 0;
   /// All messages of tf and joint states up to this number had been taken in when the poses were looked up.
   MessageIndex tf_until = 0;
-  std::vector<std::string>
-      doubts;                ///< Of its depth image and camera info: an unlikely unit, an unknown or a changed lens.
+  /// Of its depth image and camera info: an unlikely unit, an unknown or a changed lens.
+  std::vector<std::string> doubts;
   std::string camera_frame;  ///< Of the camera in tf; "" = the depth image names none.
 };
 
