@@ -5,8 +5,6 @@
 
 #include <array>
 #include <cstddef>
-#include <optional>
-#include <string_view>
 
 namespace prescene::belief {
 
@@ -28,11 +26,6 @@ inline constexpr std::size_t kEventKinds = 9;
 inline constexpr std::array<const char*, kEventKinds> kEventNames = {
     "nothing", "pushed", "bumped", "slipped", "moved", "taken_away", "put_in", "exchanged", "other"};
 inline const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
-inline std::optional<EventKind> event_kind_of(std::string_view name) {
-  for (std::size_t i = 0; i < kEventKinds; ++i)
-    if (name == kEventNames[i]) return static_cast<EventKind>(i);
-  return std::nullopt;
-}
 
 /// How probable each kind is before anything was seen, up to a common factor; >= 0, not all 0.
 /// What can't be (nothing slips that is not held) does not count, and the rest is scaled to sum to one. The weight of a

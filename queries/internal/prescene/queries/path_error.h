@@ -81,7 +81,6 @@ class PathError {
   /// Of the true pose, about that of the simulated path: coordinates as those of FramePeak.
   const geometry::Vector6d& mean() const { return mean_; }
   const geometry::Matrix6d& covariance() const { return covariance_; }
-  const geometry::Pose& path_pose() const { return X_WO_; }
   /// Where the true object is, most probably: the path's pose with the mean error.
   geometry::Pose pose() const;
 

@@ -36,11 +36,15 @@ struct BoostedTrees {
   friend bool operator==(const BoostedTrees&, const BoostedTrees&) = default;
 };
 
+/// How trees are fitted. All chosen, not tuned on data.
 struct Boosting {
-  int trees = 120;
-  double rate = 0.08;         ///< Share of each tree's step that is taken.
-  double shrinkage = 8.0;     ///< Added to a leaf's curvature: how many examples of even odds it takes to believe it.
-  double least_weight = 4.0;  ///< Curvature (a quarter of an example at even odds) that each side of a split needs.
+  int trees = 120;     ///< Their number, >= 0.
+  double rate = 0.08;  ///< Share of each tree's step that is taken, in (0, 1].
+  /// >= 0. Added to a leaf's curvature, so that few examples say little: a leaf of 4 * shrinkage examples at even odds
+  /// says half of what they do.
+  double shrinkage = 8.0;
+  /// >= 0. Curvature (a quarter of an example at even odds) that each side of a split needs.
+  double least_weight = 4.0;
 };
 
 /// `values`: row by row, `columns` finite numbers an example; yes.size() examples, of `weights` (empty = all 1).

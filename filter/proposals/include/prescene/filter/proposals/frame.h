@@ -27,7 +27,8 @@
 
 namespace prescene::filter {
 
-/// What the operators work with. Everything outlives the filter.
+/// What the operators work with; it outlives their calls. `search`, `renderer` and `meshes` are never null where an
+/// operator is called.
 struct FilterTools {
   PoseSearch* search = nullptr;
   rendering::Renderer* renderer = nullptr;
