@@ -102,7 +102,7 @@ Matrix6d covariance(const PoseDistribution& distribution);
 
 struct TwistDistribution {
   Vector3Distribution angular = Vector3Distribution::fixed(Vector3d::Zero());  ///< rad/s, in W
-  Vector3Distribution linear = Vector3Distribution::fixed(Vector3d::Zero());   ///< m/s, of the object frame's origin
+  Vector3Distribution linear = Vector3Distribution::fixed(Vector3d::Zero());   ///< m/s, of O's origin, in W
   friend bool operator==(const TwistDistribution&, const TwistDistribution&) = default;
 };
 int dimensions(const TwistDistribution& distribution);

@@ -70,8 +70,8 @@ struct JointState {
 
 /// How far a child is from where its joint allows it to be, limits apart.
 struct JointError {
-  double distance = 0.0;  ///< m
-  double angle = 0.0;     ///< rad
+  double distance = 0.0;  ///< m, >= 0
+  double angle = 0.0;     ///< rad, >= 0
 };
 
 /// A joint's position as the belief has it.

@@ -79,7 +79,7 @@ std::vector<PhysicalDraw> draws_of(const ObjectModel& model, const PhysicalBelie
 PhysicalBelief after_evidence(const ObjectModel& model, const PhysicalBelief& physics, std::uint64_t seed,
                               std::span<const double> log_likelihoods, core::TimeNs stamp_ns);
 
-/// One parameter as it is believed to be.
+/// One parameter as it is believed to be; mass in kg, centre of mass in m in O, the others without unit.
 struct ParameterEstimate {
   std::string name;  ///< "friction", "restitution", "mass", "center_of_mass_x", ..., "impact_friction".
   double mean = 0.0;

@@ -37,7 +37,7 @@ struct KinematicBody {
   MeshPtr visual;
   ContactProperties contact;
   Color color;
-  /// Poses over time, times ascending; held before the first and after the last. One entry = fixed.
+  /// Poses over time, at least one, times ascending; held before the first and after the last. One entry = fixed.
   struct Waypoint {
     double time;  ///< s since the scene's start
     Pose X_WG;
@@ -46,7 +46,7 @@ struct KinematicBody {
   std::vector<Waypoint> timeline;
   friend bool operator==(const KinematicBody& a, const KinematicBody& b);
 };
-/// Interpolated pose at a time.
+/// X_WG at a time (s since the scene's start), interpolated. The timeline is not empty (checked).
 Pose pose_at(const KinematicBody& body, double time);
 
 /// An object of the scene: which model, and what is known of its start.

@@ -14,14 +14,14 @@ namespace prescene::belief {
 /// Why an instance ended. kDecided: what was asked of it could not change any more; it was not run to rest.
 enum class TrajectoryEnd { kAtRest, kDuration, kLeftTheWorld, kDiverged, kCancelled, kDecided };
 
-/// Two things touched during [begin, end]. Bodies are numbered objects first, then supports, then robot bodies, in the
+/// Two things touched during [begin, end], s since the scene's start. Bodies are numbered objects first, then supports, then robot bodies, in the
 /// scene's order; pushers made by actions follow. first < second.
 struct ContactInterval {
   int first = 0;
   int second = 0;
   double begin = 0.0;
   double end = 0.0;
-  double largest_impulse = 0.0;  ///< N s within one step
+  double largest_impulse = 0.0;  ///< N s, within one step of the simulator.
   /// Share along up_of(scene) of the mean unit normal at the last step, from `second` to `first`: 1 = first lies flat
   /// on second, -1 = second lies on first, 0 = side by side. A contact supports when it is beyond +-0.5.
   double normal_z = 0.0;
