@@ -130,7 +130,8 @@ struct StepResult {
 
 class ParticleFilter {
  public:
-  /// All must outlive the filter.
+  /// Likelihood, renderer and threads must outlive the filter. Without `simulators` what moves goes on at constant
+  /// velocity, and nothing is learned from motion.
   ParticleFilter(const rendering::LikelihoodBatch& likelihood, rendering::Renderer& renderer, core::ThreadPool& threads,
                  FilterSettings settings, simulation::SimulatorFactory simulators = {});
 
@@ -181,6 +182,8 @@ class ParticleFilter {
   /// As its heaviest particle is seen.
   geometry::DepthImage depth_in(const FrameStep& step, std::size_t object) const;
   rendering::FrameTerms terms_in(const FrameStep& step, std::size_t object, const SearchTarget& target) const;
+  /// Whether the camera was sharp when that was last measured, so that turns are looked at in its fine image.
+  bool is_sharp(int camera) const { return smears_[static_cast<std::size_t>(camera)].is_sharp(); }
 
   FilterSettings settings_;
   simulation::SimulatorFactory simulators_;
@@ -190,9 +193,7 @@ class ParticleFilter {
   FilterTools tools_;
   RobotBounds robot_bounds_;
   std::vector<FrameCache> frame_caches_;  // by camera
-  /// Whether the camera was sharp when that was last measured, so that turns are looked at in its fine image.
-  bool is_sharp(int camera) const { return smears_[static_cast<std::size_t>(camera)].is_sharp(); }
-  std::vector<EdgeSmear> smears_;  // by camera, as last measured
+  std::vector<EdgeSmear> smears_;         // by camera, as last measured
   PrintCache prints_;
   TouchTest touch_;
   bool traces_stages_ = false;
