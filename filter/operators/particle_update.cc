@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "particle_update.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -186,15 +185,15 @@ FrameEquations ParticleUpdate::equations_at(const Pose& X_WO, double gate, const
 }
 
 bool ParticleUpdate::keep_confirmed(const Pose& X_WO, const Matrix6d& covariance, FrameEquations& equations) const {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(covariance.topLeftCorner<3, 3>());
+  const geometry::SymmetricEigen3 turns = geometry::symmetric_eigen_3(covariance.topLeftCorner<3, 3>());
   const double radius = std::max(1e-3, static_cast<double>(target_.mesh->radius));
   std::optional<double> log_here;
   bool taken = false;
   for (int i = 0; i < 3; ++i) {
-    const double deviation = std::sqrt(std::max(0.0, turns.eigenvalues()[i]));
+    const double deviation = std::sqrt(std::max(0.0, turns.values[i]));
     if (!(deviation > kUncertainTurn)) continue;
     // The turn by one deviation, with what follows it.
-    const Vector6d sideways = covariance.leftCols<3>() * turns.eigenvectors().col(i) / deviation;
+    const Vector6d sideways = covariance.leftCols<3>() * turns.vectors.col(i) / deviation;
     const Vector6d slope = equations.information * sideways;
     const double told = sideways.dot(slope);
     if (!(told > kLeastTold)) continue;

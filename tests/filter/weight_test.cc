@@ -3,11 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "filter_fixture.h"
 #include "prescene/filter/operators/initialise.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
 #include "tests/support/matchers.h"
 
@@ -75,8 +75,7 @@ TEST_F(WeightOfABox, MovesParticlesToThePoseAndNarrowsThem) {
   for (const Particle& particle : particles) sum += std::exp(particle.log_weight);
   EXPECT_NEAR(sum, 1.0, 1e-9);
   for (const Particle& particle : particles) {
-    const Eigen::SelfAdjointEigenSolver<belief::Matrix12d> solver(particle.covariance);
-    EXPECT_GT(solver.eigenvalues().minCoeff(), -1e-12);
+    EXPECT_GT(geometry::symmetric_eigen(particle.covariance).values.minCoeff(), -1e-12);
   }
 }
 

@@ -2,11 +2,11 @@
 // What every LikelihoodBatch must do, checked against the reference renderer and the sensor model pixel by pixel.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <functional>
 
 #include "prescene/core/parallel.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/rendering/gpu/compute_likelihood.h"
 #include "prescene/rendering/reference/reference_likelihood.h"
@@ -366,7 +366,7 @@ TEST_P(LikelihoodContract, GaussNewtonStepsFindTheTruth) {
       linearisation = linearise(frame, hypothesis(X_CO), options);
       Matrix6d damped = linearisation.H;
       damped.diagonal() *= 1.001;
-      X_CO = geometry::box_plus(X_CO, damped.ldlt().solve(linearisation.g));
+      X_CO = geometry::box_plus(X_CO, geometry::solve_symmetric_6(damped, linearisation.g));
       options.gate = std::max(0.004, 0.85 * options.gate);
     }
     EXPECT_LT(geometry::box_minus(X_CO, X_CO_).tail<3>().norm(), 0.002);

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -13,6 +12,7 @@
 #include "prescene/collision/spheres/uncertain_sphere_queries.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/random.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::collision {
 
@@ -89,8 +89,8 @@ struct Sampled {
 };
 
 inline Matrix6d factor_of(const Matrix6d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(covariance);
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const geometry::SymmetricEigen6 eigen = geometry::symmetric_eigen_6(covariance);
+  return eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 inline Vector6d normals(RandomStream& stream) {

@@ -4,7 +4,6 @@
 
 #include <gmock/gmock.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -16,6 +15,7 @@
 #include "every_shape.h"
 #include "prescene/core/parallel.h"
 #include "prescene/core/random.h"
+#include "prescene/geometry/dense_solvers.h"
 #include "tests/support/allocations.h"
 
 namespace prescene::collision::uncertain_shape_queries_test {
@@ -82,8 +82,8 @@ struct Sampled {
 };
 
 Matrix6d factor_of(const Matrix6d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(covariance);
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const geometry::SymmetricEigen6 eigen = geometry::symmetric_eigen_6(covariance);
+  return eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 Vector6d normals(RandomStream& stream) {
