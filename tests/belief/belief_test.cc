@@ -39,7 +39,7 @@ TEST(Normalize, SaysWhenNothingIsLeftAndMakesThemEqual) {
 }
 
 TEST(EffectiveSampleSizeLaws, LiesBetweenOneAndTheCount) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const ObjectBelief object = tests::random_object_belief(stream, "a");
     const double size = effective_sample_size(object.particles);
@@ -75,7 +75,7 @@ ObjectBelief tight_object(RandomStream& stream, double spread = 0.1) {
 }
 
 TEST(EstimateLaws, MeanAndCovarianceAreThoseOfTheDraws) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     // All of it at one place and turn: the mean of several would be none of them, and is not published.
     const ObjectBelief object = tight_object(stream, 0.02);
@@ -95,7 +95,7 @@ TEST(EstimateLaws, MeanAndCovarianceAreThoseOfTheDraws) {
 }
 
 TEST(EstimateLaws, ConfidenceIsTheShareOfDrawsNearTheMean) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     ObjectBelief object = tight_object(stream);
     object.state = TrackState::kTracked;
@@ -111,7 +111,7 @@ TEST(EstimateLaws, ConfidenceIsTheShareOfDrawsNearTheMean) {
 }
 
 TEST(EstimateLaws, TurningTheWorldTurnsTheEstimate) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const ObjectBelief object = tight_object(stream);
     ObjectBelief turned = object;
@@ -203,7 +203,7 @@ TEST(AlternativePoses, OfWhatIsLostOrSureAreNone) {
 }
 
 TEST(AlternativePosesLaws, AreFewApartFromEachOtherAndShareWhatTheEstimateLeaves) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     ObjectBelief object = tests::random_object_belief(stream, "a");
     object.state = TrackState::kTracked;

@@ -29,7 +29,7 @@ std::pair<double, double> quantile_moments(const ScalarDistribution& distributio
 }
 
 TEST(ScalarDistributionLaws, DrawsGrowWithTheirNumberStayInRangeAndHaveTheStatedMoments) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const ScalarDistribution distribution = tests::random_scalar(stream);
     const bool ordered = !std::holds_alternative<SampledScalar>(distribution);
@@ -77,7 +77,7 @@ TEST(ScalarDistribution, CutFarOutInATailStaysThereWithoutLosingItsShape) {
 }
 
 TEST(CovarianceSquareRootLaws, ItsSquareIsTheCovarianceAndItsColumnsAreTheRankWidestFirst) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const int size = 1 + tests::random_below(stream, 12);
     const int rank = tests::random_below(stream, size + 1);
@@ -92,7 +92,7 @@ TEST(CovarianceSquareRootLaws, ItsSquareIsTheCovarianceAndItsColumnsAreTheRankWi
 }
 
 TEST(PoseDistributionLaws, ANormalPoseIsTheErrorMapOfStandardNormals) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const Pose X_mean = tests::random_pose(stream);
     const NormalPose normal{X_mean, tests::random_covariance(stream, 6, 6)};
@@ -110,7 +110,7 @@ TEST(PoseDistributionLaws, ANormalPoseIsTheErrorMapOfStandardNormals) {
 }
 
 TEST(PoseDistributionLaws, SobolDrawsHaveTheStatedMeanAndCovariance) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     PoseDistribution distribution = tests::random_pose_distribution(stream);
     if (auto* box = std::get_if<BoxPose>(&distribution)) box->any_rotation = false;

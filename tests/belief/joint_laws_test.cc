@@ -168,7 +168,7 @@ std::vector<int> order_by_passes(const Scene& scene) {
 }
 
 TEST(JointLaws, TheOrderIsThatOfPassesThroughTheJoints) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, core::Purpose::kTest);
     const auto below = [&](std::size_t n) {
       return static_cast<std::size_t>(stream.uniform() * static_cast<double>(n));

@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 using testing::HasSubstr;
 
 TEST(JsonLaws, QueriesReadBackAsTheyWereWritten) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const Query query = tests::random_query(stream);
     const auto read = query_from_json(to_json(query).dump());
@@ -27,7 +27,7 @@ TEST(JsonLaws, QueriesReadBackAsTheyWereWritten) {
 }
 
 TEST(JsonLaws, ActionsAndOutcomesReadBackAsTheyWereWritten) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const Action action = tests::random_action(stream);
     const auto read_action = action_from_json(Json::parse(to_json(action).dump()));
@@ -42,7 +42,7 @@ TEST(JsonLaws, ActionsAndOutcomesReadBackAsTheyWereWritten) {
 
 TEST(JsonLaws, BeliefsReadBackWithTheSameBits) {
   const auto scene = std::make_shared<const Scene>(tests::small_scene());
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     Belief belief = tests::random_belief(stream, scene);
     if (!belief.objects.empty())
@@ -69,7 +69,7 @@ void for_each_key(Json& value, const std::function<void(Json&, const std::string
 }
 
 TEST(JsonLaws, AMistypedKeyIsAnErrorThatNamesIt) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     Json document = to_json(tests::random_query(stream));
     for_each_key(document, [&](Json& object, const std::string& key) {
@@ -86,7 +86,7 @@ TEST(JsonLaws, AMistypedKeyIsAnErrorThatNamesIt) {
 }
 
 TEST(JsonLaws, AValueOfAnotherTypeIsAnErrorOrStillRead) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     Json document = to_json(tests::random_query(stream));
     for_each_key(document, [&](Json& object, const std::string& key) {

@@ -70,7 +70,7 @@ TEST(AllenRelations, JustOneOfThirteenIsTrueOfAnyTwoIntervals) {
 }
 
 TEST(AllenRelations, ItIsTheSameOfIntervalsThatAreShiftedAndStretched) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const auto end = [](int begin) { return begin + *rc::gen::inRange(1, 6); };
     const int a = *rc::gen::inRange(0, 8), c = *rc::gen::inRange(0, 8);
     const int b = end(a), d = end(c);

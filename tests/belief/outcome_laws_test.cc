@@ -37,7 +37,7 @@ Predicate moved(Predicate predicate, const Pose& X_VW) {
 
 TEST(OutcomeLaws, TurningTheWorldAboutTheVerticalAndShiftingItChangesNoAnswer) {
   const Scene scene = tests::small_scene();
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const Trajectory trajectory = tests::random_trajectory(stream);
     const Condition condition{tests::random_predicate(stream), static_cast<When>(tests::random_below(stream, 3)),
@@ -51,7 +51,7 @@ TEST(OutcomeLaws, TurningTheWorldAboutTheVerticalAndShiftingItChangesNoAnswer) {
 
 TEST(OutcomeLaws, NegationTurnsTheAnswerRound) {
   const Scene scene = tests::small_scene();
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const Trajectory trajectory = tests::random_trajectory(stream);
     Condition condition{tests::random_predicate(stream), static_cast<When>(tests::random_below(stream, 3)), false};
@@ -63,7 +63,7 @@ TEST(OutcomeLaws, NegationTurnsTheAnswerRound) {
 
 TEST(OutcomeLaws, AlwaysImpliesAtTheEndImpliesEver) {
   const Scene scene = tests::small_scene();
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const Trajectory trajectory = tests::random_trajectory(stream);
     const Predicate predicate = tests::random_predicate(stream);
@@ -77,7 +77,7 @@ TEST(OutcomeLaws, AlwaysImpliesAtTheEndImpliesEver) {
 
 TEST(OutcomeLaws, AllOfIsTheConjunctionAnyOfTheDisjunctionAndAGroupIsAPartition) {
   const Scene scene = tests::small_scene();
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const Trajectory trajectory = tests::random_trajectory(stream);
     ExclusiveOutcomes group{"group", {}};
@@ -105,7 +105,7 @@ TEST(OutcomeLaws, AllOfIsTheConjunctionAnyOfTheDisjunctionAndAGroupIsAPartition)
 TEST(OutcomeLaws, JustOneOfTheSixFacesIsUpAndItIsTheNearestToTheVertical) {
   const Scene scene = tests::small_scene();
   const ExclusiveOutcomes faces = which_face_up("up", "block");
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const Trajectory trajectory = tests::random_trajectory(stream);
     int holding = 0;
@@ -121,7 +121,7 @@ TEST(OutcomeLaws, JustOneOfTheSixFacesIsUpAndItIsTheNearestToTheVertical) {
 
 TEST(OutcomeLaws, WhatLooksAtTheEndOnlyNeedsNoStatesAlongTheWay) {
   const Scene scene = tests::small_scene();
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, Purpose::kTest);
     const Trajectory trajectory = tests::random_trajectory(stream);
     const Outcome outcome = tests::random_outcome(stream, "a");

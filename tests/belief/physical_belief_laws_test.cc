@@ -4,7 +4,6 @@
 #include "prescene/belief/physical_belief.h"
 
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "prescene/core/random.h"
 #include "prescene/core/sobol.h"
 #include "tests/belief/random_values.h"
+#include "tests/support/laws.h"
 
 namespace prescene::belief::physical_belief_test {
 namespace {
@@ -68,7 +68,7 @@ TEST(PhysicalBelief, OfNothingLearnedIsThePriors) {
 }
 
 TEST(PhysicalBelief, EvidenceThatSaysNothingLeavesEveryMarginalAsItWas) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     const ObjectModel model = uncertain_model();
     PhysicalBelief physics;
     for (int lesson = 0; lesson < 3; ++lesson) {

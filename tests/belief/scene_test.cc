@@ -132,7 +132,7 @@ TEST(DrawStart, DealsPositionsFirstAndTheWidestObjectBeforeTheOthers) {
 }
 
 TEST(DrawStartLaws, TheMiddleOfTheCubeIsTheMeanWhereDistributionsAreSymmetric) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     Scene scene = tests::small_scene();
     for (SceneObject& object : scene.objects)

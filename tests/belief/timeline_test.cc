@@ -69,7 +69,7 @@ TEST(Timeline, NamesVolumesOfOutcomesAboutTheObject) {
 
 TEST(TimelineLaws, IntervalsAreOrderedLieWithinTheTrajectoryAndDoNotOverlapThemselves) {
   const Scene scene = tests::small_scene();
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const Trajectory trajectory = tests::random_trajectory(stream);
     const Timeline timeline = timeline_of(scene, trajectory);

@@ -137,7 +137,7 @@ class ContinuousQueries : public TargetTest {
 TEST_P(ContinuousQueries, MissNoContact) {
   constexpr double kTolerance = 1e-4;
   Seen seen;
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     const TriangleTree a = tree_of(*tests::closed_meshes());
     const TriangleTree b = tree_of(*tests::closed_meshes());
     // Somewhere on its way or at its end, B meets A, if not before.
@@ -297,7 +297,7 @@ TEST_P(ContinuousQueries, CountTouchingAndNotPassing) {
 TEST_P(ContinuousQueries, AgreeWhenTheBodiesAreExchanged) {
   constexpr double kTolerance = 1e-4;
   int contacts = 0;
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     const TriangleTree a = tree_of(*tests::closed_meshes());
     const TriangleTree b = tree_of(*tests::closed_meshes());
     const Pose X_start = *tests::poses(1.5);
@@ -412,7 +412,7 @@ TEST(RigidMotions, RefuseWhatIsNotFinite) {
 }
 
 TEST(RigidMotions, MoveAsTheirFieldsSay) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Pose X_start = *tests::poses();
     const bool is_screw = *rc::gen::arbitrary<bool>();
     const RigidMotion motion = is_screw ? screw(X_start, *tests::poses())

@@ -96,7 +96,7 @@ class EachTarget : public testing::Test {
   static void check(const std::function<void()>& property) {
     for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
       const UseTarget only(target);
-      EXPECT_TRUE(rc::check(std::string("with ") + hwy::TargetName(target), property));
+      EXPECT_TRUE(tests::check_law(std::string("with ") + hwy::TargetName(target), property));
     }
   }
 };

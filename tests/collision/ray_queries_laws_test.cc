@@ -278,7 +278,7 @@ TEST_P(RayQueries, AnswerNothingToRaysThatAreNotInOrder) {
 INSTANTIATE_TEST_SUITE_P(AllTargets, RayQueries, testing::ValuesIn(all_targets()), target_name);
 
 TEST(RayQueriesInFrames, MoveWithTheBody) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleTree tree = tree_of(*tests::closed_meshes());
     const geometry::Pose pose = *tests::poses();
     const auto X_WB = to_transform(pose);

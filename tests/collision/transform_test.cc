@@ -13,7 +13,7 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(Transform, AgreesWithThePosesInTheWorld) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const geometry::Pose X_WA = normalized(*tests::poses());
     const geometry::Pose X_WB = normalized(*tests::poses());
     const geometry::Vector3d p_BQ = *tests::vectors();

@@ -63,7 +63,7 @@ Transform touching_pose(const Mesh& a, const Mesh& b) {
 TEST(TriangleQueries, FindWhatBruteForceFinds) {
   int configurations = 0;
   int intersecting = 0;
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     const TriangleTree a = tree_of(*tests::closed_meshes());
     const TriangleTree b = tree_of(*tests::closed_meshes());
     QueryScratch scratch;
@@ -113,7 +113,7 @@ void assert_same_but_for_rounding(bool one, bool other, const TriangleTree& a, c
 }
 
 TEST(TriangleQueries, AreSymmetricInTheBodies) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleTree a = tree_of(*tests::closed_meshes());
     const TriangleTree b = tree_of(*tests::closed_meshes());
     QueryScratch scratch;
@@ -123,7 +123,7 @@ TEST(TriangleQueries, AreSymmetricInTheBodies) {
 }
 
 TEST(TriangleQueries, DoNotSeeACommonRigidMotion) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const geometry::TriangleMesh mesh_a = *tests::closed_meshes();
     const geometry::TriangleMesh mesh_b = *tests::closed_meshes();
     const geometry::Pose X_MA = *tests::poses(0.1);
@@ -148,7 +148,7 @@ TEST(TriangleQueries, DoNotSeeACommonRigidMotion) {
 }
 
 TEST(TriangleQueries, AnswerAlikeForEveryTreeAndInstructionSet) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     core::ThreadPool pool(1);
     const auto mesh_a = to_mesh(*tests::closed_meshes());
     const auto mesh_b = to_mesh(*tests::closed_meshes());
@@ -188,7 +188,7 @@ Transform nudged(const Transform& X_AB, double distance, double reach) {
 TEST(TriangleQueries, AnswerBatchesLikeSingleQueries) {
   int touching = 0;
   int configurations = 0;
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     const TriangleTree a = tree_of(*tests::closed_meshes());
     const TriangleTree b = tree_of(*tests::closed_meshes());
     QueryScratch scratch;

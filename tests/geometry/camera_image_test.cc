@@ -28,7 +28,7 @@ TEST(PinholeCamera, ProjectsAlongTheAxes) {
 }
 
 TEST(PinholeCamera, UnprojectingIsTheInverse) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const double u = *tests::numbers(0.0, 640.0);
     const double v = *tests::numbers(0.0, 480.0);
     const double depth = *tests::numbers(0.1, 5.0);
@@ -45,7 +45,7 @@ TEST(LevelCamera, LooksAlongX) {
 }
 
 TEST(LevelCamera, IsARotationWithALevelXAndYDown) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const double azimuth = *tests::numbers(-3.14, 3.14), elevation = *tests::numbers(-1.5, 1.5);
     const Vector3d forward(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                            std::sin(elevation));

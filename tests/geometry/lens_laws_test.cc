@@ -33,7 +33,7 @@ Vector2d point_inside(const LensDistortion& lens) {
 
 template <class Lens>
 void check_inverse(const Lens& any_lens) {
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     const LensDistortion lens = any_lens();
     const Vector2d p = point_inside(lens);
     const auto q = lens.distort(p);
@@ -56,7 +56,7 @@ TEST(LensLaws, UndistortingIsTheInverseOfEquidistant) {
 }
 
 TEST(LensLaws, WhatUndistortsIsInsideAndDistortsBack) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const LensDistortion lens = *numbers(0.0, 1.0) < 0.5 ? any_brown(true) : any_fisheye();
     const Vector2d q(*numbers(-2.0, 2.0), *numbers(-2.0, 2.0));
     const auto p = lens.undistort(q);
@@ -68,7 +68,7 @@ TEST(LensLaws, WhatUndistortsIsInsideAndDistortsBack) {
 }
 
 TEST(LensLaws, ImagesGrowOutwardsUpToTheFold) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     LensDistortion lens = any_fisheye();
     double before = -1.0;
     for (int i = 0; i <= 100; ++i) {

@@ -58,7 +58,7 @@ MassProperties by_tetrahedra(const TriangleMesh& mesh, double density, const Vec
 }
 
 TEST(MassPropertiesLaws, FaceIntegralsAndTetrahedraAgree) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleMesh mesh = *closed_meshes();
     const auto integrals = mass_properties(mesh, kDensity);
     RC_ASSERT(integrals.ok());
@@ -71,7 +71,7 @@ TEST(MassPropertiesLaws, FaceIntegralsAndTetrahedraAgree) {
 TEST(MassPropertiesLaws, FineMeshesApproachTheClosedForms) {
   // Inscribed meshes of n segments miss a share of about 7 / n^2 of the volume and 15 / n^2 of the inertia.
   constexpr int kSegments = 128;
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Primitive primitive = *primitives();
     const TriangleMesh mesh = make_mesh(primitive, kSegments);
     const auto of_mesh = mass_properties(mesh, kDensity);
@@ -85,7 +85,7 @@ TEST(MassPropertiesLaws, FineMeshesApproachTheClosedForms) {
 }
 
 TEST(MassPropertiesLaws, MovingTheMeshMovesTheBody) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleMesh mesh = *closed_meshes();
     const Pose X = *poses();
     const auto moved_mesh = mass_properties(transformed(mesh, X), kDensity);
@@ -96,7 +96,7 @@ TEST(MassPropertiesLaws, MovingTheMeshMovesTheBody) {
 }
 
 TEST(MassPropertiesLaws, LengthsScaleMassByTheThirdAndInertiaByTheFifthPower) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleMesh mesh = *closed_meshes();
     const double s = *tests::numbers(0.01, 10.0);
     const auto body = mass_properties(mesh, kDensity);
@@ -108,7 +108,7 @@ TEST(MassPropertiesLaws, LengthsScaleMassByTheThirdAndInertiaByTheFifthPower) {
 }
 
 TEST(MassPropertiesLaws, TwoBodiesTogetherAreTheirJoinedMesh) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleMesh a = *closed_meshes();
     const TriangleMesh b = transformed(*closed_meshes(), Pose::from_translation({9.0, 1.0, -2.0}));
     const auto body_a = mass_properties(a, kDensity);
@@ -121,7 +121,7 @@ TEST(MassPropertiesLaws, TwoBodiesTogetherAreTheirJoinedMesh) {
 }
 
 TEST(MassPropertiesLaws, PrincipalAxesDiagonaliseTheInertia) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const auto body = mass_properties(*closed_meshes(), kDensity);
     RC_ASSERT(body.ok());
     const PrincipalInertia principal = principal_inertia(*body);

@@ -21,7 +21,7 @@ using tests::poses;
 double size_of(const TriangleMesh& mesh) { return bounding_box(mesh).sizes().maxCoeff(); }
 
 TEST(MeshLaws, GeneratedMeshesAreClosedAndTurnedOutwards) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleMesh mesh = *closed_meshes();
     const MeshTopology topology = mesh_topology(mesh);
     RC_ASSERT(topology.watertight() && topology.oriented() && topology.bounds_volume());
@@ -31,7 +31,7 @@ TEST(MeshLaws, GeneratedMeshesAreClosedAndTurnedOutwards) {
 }
 
 TEST(MeshLaws, RigidMotionsKeepAreaVolumeAndRadius) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleMesh mesh = *closed_meshes();
     const Pose X = *poses();
     const TriangleMesh moved = transformed(mesh, X);
@@ -44,7 +44,7 @@ TEST(MeshLaws, RigidMotionsKeepAreaVolumeAndRadius) {
 }
 
 TEST(MeshLaws, RepairIsIdempotentWhateverTheInput) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     // A closed mesh with damage: indices changed, vertices made NaN, merged or put into a line.
     TriangleMesh mesh = *closed_meshes();
     core::RandomStream stream(seed, core::Purpose::kTest);
@@ -89,7 +89,7 @@ TEST(MeshLaws, RepairIsIdempotentWhateverTheInput) {
 }
 
 TEST(MeshLaws, ComponentsAddUp) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleMesh a = *closed_meshes();
     const TriangleMesh b = transformed(*closed_meshes(), Pose::from_translation({20.0, 0.0, 0.0}));
     const TriangleMesh both = joined(a, b);
@@ -150,7 +150,7 @@ rc::Gen<std::vector<Vector3d>> point_clouds() {
 }
 
 TEST(ConvexHullLaws, HoldsAllPointsAndIsClosedAndConvex) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const std::vector<Vector3d> points = *point_clouds();
     const auto hull = convex_hull(points);
     RC_PRE(hull.ok());
@@ -167,7 +167,7 @@ TEST(ConvexHullLaws, HoldsAllPointsAndIsClosedAndConvex) {
 }
 
 TEST(ConvexHullLaws, DependsOnTheSetOfPointsOnly) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     std::vector<Vector3d> points = *point_clouds();
     const auto hull = convex_hull(points);
     RC_PRE(hull.ok());
@@ -180,7 +180,7 @@ TEST(ConvexHullLaws, DependsOnTheSetOfPointsOnly) {
 }
 
 TEST(ConvexHullLaws, HullOfAHullIsTheHull) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const auto hull = convex_hull(*point_clouds());
     RC_PRE(hull.ok());
     const auto again = convex_hull(hull->vertices);
@@ -190,7 +190,7 @@ TEST(ConvexHullLaws, HullOfAHullIsTheHull) {
 }
 
 TEST(ConvexHullLaws, MovesWithThePoints) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const std::vector<Vector3d> points = *point_clouds();
     const auto hull = convex_hull(points);
     RC_PRE(hull.ok());
@@ -237,7 +237,7 @@ TEST(ConvexHull, FlatInputIsAnError) {
 }
 
 TEST(SimplifiedLaws, KeepsClosedSurfacesClosed) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleMesh mesh = *closed_meshes();
     const int wanted = *rc::gen::inRange(4, 200);
     const TriangleMesh coarse = simplified(mesh, wanted);
@@ -255,7 +255,7 @@ TEST(SimplifiedLaws, KeepsClosedSurfacesClosed) {
 }
 
 TEST(MeshLaws, RefiningKeepsTheSurfaceAndItsSeamsAndMakesNoSlivers) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const TriangleMesh mesh = *closed_meshes();
     const double size = size_of(mesh);
     const double longest = 0.01 * *rc::gen::inRange(15, 120) * size;

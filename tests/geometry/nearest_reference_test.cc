@@ -50,7 +50,7 @@ std::vector<Vector3d> surface_points(int count, std::uint64_t seed) {
 }
 
 TEST(PointTree, FindsWhatBruteForceFinds) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     // Clouds with many equal coordinates and equal points too.
     const int count = *rc::gen::inRange(1, 200);
@@ -86,7 +86,7 @@ TEST(PointTree, OrderIsAPermutation) {
 TEST(PoseError, MatchesItsDefinition) {
   const std::vector<Vector3d> points = surface_points(300, 2);
   const AddsEvaluator evaluator(points);
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     const Pose X_truth = *tests::poses();
     Vector6d d = *tests::pose_errors();
     d *= std::pow(10.0, *tests::numbers(-5.0, 0.0));

@@ -21,7 +21,7 @@ double distance(const Pose& a, const Pose& b) {
 }
 
 TEST(PoseLaws, PosesAreAGroup) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Pose a = *poses();
     const Pose b = *poses();
     const Pose c = *poses();
@@ -32,7 +32,7 @@ TEST(PoseLaws, PosesAreAGroup) {
 }
 
 TEST(PoseLaws, ProductsActOnPointsLikeMatrices) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Pose a = *poses();
     const Pose b = *poses();
     const Vector3d p = *vectors();
@@ -44,7 +44,7 @@ TEST(PoseLaws, ProductsActOnPointsLikeMatrices) {
 }
 
 TEST(PoseLaws, LogIsTheShortestRotationVector) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Quaterniond q = *rotations();
     const Vector3d v = log_rotation(q);
     RC_ASSERT(v.norm() <= std::numbers::pi + 1e-15);
@@ -55,7 +55,7 @@ TEST(PoseLaws, LogIsTheShortestRotationVector) {
 }
 
 TEST(PoseLaws, AnglesAreAMetricThatTurningKeeps) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Quaterniond a = *rotations();
     const Quaterniond b = *rotations();
     const Quaterniond c = *rotations();
@@ -67,7 +67,7 @@ TEST(PoseLaws, AnglesAreAMetricThatTurningKeeps) {
 }
 
 TEST(PoseLaws, BoxMinusInvertsBoxPlus) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Pose mean = *poses();
     const Vector6d d = *pose_errors();
     RC_ASSERT((box_minus(box_plus(mean, d), mean) - d).norm() < 1e-12);
@@ -77,7 +77,7 @@ TEST(PoseLaws, BoxMinusInvertsBoxPlus) {
 }
 
 TEST(PoseLaws, InterpolationMovesAtConstantSpeed) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Pose a = *poses();
     const Pose b = *poses();
     const double t = *numbers(0.0, 1.0);
@@ -89,7 +89,7 @@ TEST(PoseLaws, InterpolationMovesAtConstantSpeed) {
 }
 
 TEST(PoseLaws, ShiftedTwistsAreThatOfPointsOfTheBody) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Twist V{*vectors(), *vectors()};
     const Vector3d p = *vectors();
     const Vector3d q = *vectors();
@@ -104,7 +104,7 @@ TEST(PoseLaws, ShiftedTwistsAreThatOfPointsOfTheBody) {
 }
 
 TEST(PoseLaws, DistanceToAPlaneDoesNotDependOnTheFrame) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Plane plane_B{*tests::directions(), *numbers(-2.0, 2.0)};
     const Pose X_AB = *poses();
     const Vector3d p_B = *vectors();

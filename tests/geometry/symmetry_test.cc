@@ -58,7 +58,7 @@ TEST(Symmetry, OfACubeAreTheRotationsThatPermuteTheAxes) {
 
 TEST(SymmetryLaws, EquivalentPosesAreAtAngleZero) {
   for (const SymmetryGroup& group : groups()) {
-    EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+    EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
       core::RandomStream stream(seed, core::Purpose::kTest);
       const Pose X = *poses();
       const Pose Y = *poses();
@@ -75,7 +75,7 @@ TEST(SymmetryLaws, EquivalentPosesAreAtAngleZero) {
 
 TEST(SymmetryLaws, ClosestEquivalentIsClosestAndKeepsTheCentre) {
   for (const SymmetryGroup& group : groups()) {
-    EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+    EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
       core::RandomStream stream(seed, core::Purpose::kTest);
       const Pose X = *poses();
       const Pose R = *poses();

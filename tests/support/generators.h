@@ -2,7 +2,7 @@
 // RapidCheck generators of geometry. Values are small fractions that are not exact in binary and shrink towards zero,
 // identity or the simplest shape.
 //
-//   EXPECT_TRUE(rc::check([] {
+//   EXPECT_TRUE(check_law([] {
 //     const Pose X_AB = *tests::poses();
 //     RC_ASSERT(X_AB.inverse().inverse() == X_AB);
 //   }));

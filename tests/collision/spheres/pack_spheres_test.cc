@@ -60,7 +60,7 @@ void expect_apart(const SpherePacking& packing) {
 
 TEST(PackSpheres, SpheresLieInsideAndApart) {
   core::ThreadPool pool(2);
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     const auto mesh = to_mesh(*tests::closed_meshes());
     const auto packed = pack_spheres(*mesh, {.max_spheres = 12, .layouts = 2}, pool);
     RC_ASSERT(packed.ok());

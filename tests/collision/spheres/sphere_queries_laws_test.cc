@@ -41,7 +41,7 @@ Pose near_pose() { return *tests::poses(0.08); }
 constexpr double kRounding = 2e-6;  // m, of poses of a decimetre in single precision, with room.
 
 TEST(SphereQueriesLaw, SymmetricInTheBodies) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const auto& [a, b] = bodies();
     SphereScratch scratch;
     const Pose X_AB = near_pose();
@@ -78,7 +78,7 @@ Tree moved(const Tree& tree, const Pose& X_MB) {
 }
 
 TEST(SphereQueriesLaw, FramesOfTheBodiesDoNotMatter) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const auto& [a, b] = bodies();
     SphereScratch scratch;
     const Pose X_MA = *tests::poses(0.1);
@@ -104,7 +104,7 @@ TEST(SphereQueriesLaw, FramesOfTheBodiesDoNotMatter) {
 }
 
 TEST(SphereQueriesLaw, DistanceChangesByAtMostTheWay) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const auto& [a, b] = bodies();
     SphereScratch scratch;
     Pose X_AB = near_pose();
@@ -117,7 +117,7 @@ TEST(SphereQueriesLaw, DistanceChangesByAtMostTheWay) {
 }
 
 TEST(SphereQueriesLaw, SharedVolumeIsAtMostEitherVolume) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const auto& [a, b] = bodies();
     SphereScratch scratch;
     const double volume = overlap_volume(*a, *b, *to_transform(near_pose()), scratch).volume;
@@ -136,7 +136,7 @@ TEST(SphereQueriesLaw, MoreSpheresShareMoreVolume) {
   };
   const Tree few = first(40);
   const Tree many = first(200);
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     SphereScratch scratch;
     const Transform X_AB = *to_transform(near_pose());
     RC_ASSERT(overlap_volume(*few, *bodies().b, X_AB, scratch).volume <=
@@ -147,7 +147,7 @@ TEST(SphereQueriesLaw, MoreSpheresShareMoreVolume) {
 }
 
 TEST(SphereQueriesLaw, ForceAndTorqueAreTheGradientOfTheEnergy) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const Tree& a = bodies().a;
     const Tree& b = bodies().b;
     SphereScratch scratch;

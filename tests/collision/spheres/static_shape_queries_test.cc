@@ -74,7 +74,7 @@ TEST(StaticShapeQueries, AgreeWithEachSphereOnItsOwn) {
   const Tree tree = packed(geometry::Capsule{0.02, 0.06}, {.max_spheres = 150});
   SphereScratch scratch;
   for (const std::unique_ptr<StaticShape>& shape : every_shape())
-    EXPECT_TRUE(rc::check([&] { expect_agreement(*tree, *shape, *tests::poses(0.1), scratch); }));
+    EXPECT_TRUE(tests::check_law([&] { expect_agreement(*tree, *shape, *tests::poses(0.1), scratch); }));
 }
 
 TEST(StaticShapeQueries, VolumeBehindAHalfSpaceIsExact) {

@@ -39,7 +39,7 @@ void check_laws(const StaticShape& shape, const Vector3d& p, const Vector3d& way
 }
 
 TEST(PrimitiveShape, DistancesObeyTheirLaws) {
-  EXPECT_TRUE(rc::check(
+  EXPECT_TRUE(tests::check_law(
       [] { check_laws(*PrimitiveShape::make(*tests::primitives()), *tests::vectors(1.0), *tests::vectors(0.2)); }));
 }
 
@@ -48,7 +48,7 @@ TEST(PrimitiveShape, AgreesWithItsMesh) {
   const geometry::BoxShape box{{0.2, 0.3, 0.4}};
   const auto shape = *PrimitiveShape::make(box);
   const auto solid = *TriangleSurface::make(to_mesh(geometry::make_mesh(box)), SurfaceSide::kSolid, shape_pool());
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     const Vector3d p = *tests::vectors(0.4);
     RC_ASSERT(std::abs(shape.nearest(p, kFar)->distance - solid.nearest(p, kFar)->distance) < 1e-6);
   }));
@@ -149,7 +149,7 @@ TEST(TriangleSurface, SharesATreeThatCameFromAFile) {
 }
 
 TEST(TriangleSurface, DistancesObeyTheirLaws) {
-  EXPECT_TRUE(rc::check([] {
+  EXPECT_TRUE(tests::check_law([] {
     const auto mesh = to_mesh(*tests::closed_meshes());
     const Vector3d p = *tests::vectors(1.0);
     const Vector3d way = *tests::vectors(0.2);
@@ -167,7 +167,7 @@ HeightField::Grid hills(int columns, int rows) {
 
 TEST(HeightField, DistancesObeyTheirLaws) {
   const auto field = *HeightField::make(hills(9, 12), "hills");
-  EXPECT_TRUE(rc::check([&] {
+  EXPECT_TRUE(tests::check_law([&] {
     const Vector3d p = Vector3d(0.4, 0.4, 0.0) + *tests::vectors(0.9);
     check_laws(field, p, *tests::vectors(0.2));
   }));

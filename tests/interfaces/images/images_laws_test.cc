@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
 
 #include <cmath>
 #include <utility>
@@ -8,6 +7,7 @@
 #include "prescene/core/random.h"
 #include "prescene/interfaces/images/jpeg.h"
 #include "prescene/interfaces/images/png.h"
+#include "tests/support/laws.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -41,7 +41,7 @@ ColorImage smooth_image(core::RandomStream* stream) {
 }
 
 TEST(PngLaws, GoThereAndBack) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const auto byte = [&] { return static_cast<std::uint8_t>(stream.uniform_below(256)); };
     const auto color = random_image<geometry::Rgb>(&stream, [&] { return geometry::Rgb{byte(), byte(), byte()}; });
@@ -57,7 +57,7 @@ TEST(PngLaws, GoThereAndBack) {
 }
 
 TEST(PngLaws, DepthIsKeptWithinHalfAUnit) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const double unit = stream.uniform(1e-4, 1e-2);
     const auto depth = random_image<float>(&stream, [&] {
@@ -81,7 +81,7 @@ TEST(PngLaws, AViewOfAPartIsWrittenAsThatPart) {
 }
 
 TEST(JpegLaws, ComeBackNearly) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const ColorImage color = smooth_image(&stream);
     const auto back = decode_color(encode_jpeg(color.view(), 95));
@@ -96,7 +96,7 @@ TEST(JpegLaws, ComeBackNearly) {
 }
 
 TEST(ImageLaws, RandomDamageNeverCrashes) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const ColorImage color = smooth_image(&stream);
     for (auto bytes : {encode_png(color.view()), encode_jpeg(color.view(), 80)}) {

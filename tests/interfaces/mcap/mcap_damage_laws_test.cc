@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
 
 #include <algorithm>
 
 #include "recordings.h"
+#include "tests/support/laws.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -79,7 +79,7 @@ std::vector<TopicMessage> in_time_order(std::vector<TopicMessage> messages) {
 }
 
 TEST(McapDamageLaws, ADamagedFileIsRefusedOrReadAsItWasWritten) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const auto messages = tests::random_messages(&stream, 30, 200);
     const Bytes bytes = with_one_wrong_byte(messages, &stream);
@@ -103,7 +103,7 @@ TEST(McapDamageLaws, ADamagedFileIsRefusedOrReadAsItWasWritten) {
 }
 
 TEST(McapDamageLaws, WhatIsSalvagedFromADamagedFileWasWritten) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const auto messages = tests::random_messages(&stream, 30, 200);
     auto reader = McapReader::open_bytes(with_one_wrong_byte(messages, &stream), {.salvage = true});
@@ -117,7 +117,7 @@ TEST(McapDamageLaws, WhatIsSalvagedFromADamagedFileWasWritten) {
 }
 
 TEST(McapDamageLaws, AnyDamageIsSurvived) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const auto messages = tests::random_messages(&stream, 20, 100);
     Bytes bytes = tests::record(messages, {.compression = kCompressions[stream.uniform_below(3)], .chunk_bytes = 400},

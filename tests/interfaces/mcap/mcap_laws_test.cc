@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
 
 #include <algorithm>
 
 #include "recordings.h"
+#include "tests/support/laws.h"
 
 namespace prescene::interfaces::mcap_laws_test {
 namespace {
@@ -20,7 +20,7 @@ std::vector<TopicMessage> by_time(std::vector<TopicMessage> messages) {
 }
 
 TEST(McapLaws, MessagesComeBackInTheOrderOfTime) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const auto messages = tests::random_messages(&stream, 60, 3000);
     const std::size_t chunk_bytes = stream.uniform_below(20000);
@@ -38,7 +38,7 @@ TEST(McapLaws, MessagesComeBackInTheOrderOfTime) {
 }
 
 TEST(McapLaws, AFilterGivesWhatFilteringAllGives) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const auto messages = tests::random_messages(&stream, 80, 300);
     auto bytes = tests::record(messages, {.chunk_bytes = 1000, .chunk_ns = 200});
@@ -58,7 +58,7 @@ TEST(McapLaws, AFilterGivesWhatFilteringAllGives) {
 }
 
 TEST(McapLaws, LittleMemoryCostsTheOrderNotTheMessages) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     auto messages = tests::random_messages(&stream, 60, 300);
     for (auto& message : messages) message.log_time_ns = static_cast<std::int64_t>(stream.uniform_below(100));

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
 
 #include "decode_text.h"
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
 #include "prescene/geometry/sampling.h"
 #include "prescene/interfaces/bytes/file.h"
+#include "tests/support/laws.h"
 #include "tests/support/paths.h"
 
 namespace prescene::interfaces {
@@ -34,7 +34,7 @@ TriangleMesh random_mesh(core::RandomStream* stream) {
 }
 
 TEST(MeshFileLaws, PlyAndObjGiveTheSameBits) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const TriangleMesh mesh = random_mesh(&stream);
     std::vector<geometry::Rgb> colors(mesh.vertices.size());
@@ -58,7 +58,7 @@ TEST(MeshFileLaws, PlyAndObjGiveTheSameBits) {
 }
 
 TEST(MeshFileLaws, StlGivesTheSameSurface) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const TriangleMesh mesh = random_mesh(&stream);
     const auto text = decode_text(MeshFormat::kStl, encode_stl(mesh, MeshEncoding::kText));
@@ -91,7 +91,7 @@ TEST(MeshFileLaws, FilesAreReadByTheirExtension) {
 }
 
 TEST(MeshFileLaws, RandomDamageNeverCrashes) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const TriangleMesh mesh = geometry::make_mesh(geometry::BoxShape{{0.1, 0.2, 0.3}});
     const std::pair<MeshFormat, std::string> files[] = {

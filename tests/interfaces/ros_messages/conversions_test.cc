@@ -3,13 +3,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
-#include <Eigen/Eigenvalues>
 
 #include <cmath>
 #include <limits>
 
+#include "prescene/geometry/dense_solvers.h"
 #include "prescene/geometry/sampling.h"
+#include "tests/support/laws.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -72,7 +72,7 @@ TEST(Poses, SayWhichFieldIsWrong) {
 }
 
 TEST(PoseLaws, GoThereAndBack) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const Pose X = geometry::normalized({geometry::uniform_rotation(stream), geometry::normal_vector(stream)});
     const auto back = to_pose(to_ros_pose(X));
@@ -85,7 +85,7 @@ TEST(PoseLaws, GoThereAndBack) {
 
 // The covariance in ROS's coordinates, estimated by its definition: scatter of samples about the mean.
 TEST(PoseLaws, CovariancesFollowTheCoordinates) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const Pose X = geometry::normalized({geometry::uniform_rotation(stream), geometry::normal_vector(stream)});
     Matrix6d A;
@@ -132,7 +132,7 @@ TEST(Covariances, AreUnknownWrongOrMadeSound) {
   message.covariance[1] = 1.0;  // Asymmetric, too.
   const Matrix6d covariance = **to_covariance(message);
   EXPECT_EQ(covariance, covariance.transpose());
-  EXPECT_GE(Eigen::SelfAdjointEigenSolver<Matrix6d>(covariance).eigenvalues().minCoeff(), -1e-12);
+  EXPECT_GE(geometry::symmetric_eigenvalues_6(covariance).minCoeff(), -1e-12);
   EXPECT_GT(covariance.norm(), 0.0);
 }
 

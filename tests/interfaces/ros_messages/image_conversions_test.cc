@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <rapidcheck.h>
 
 #include <cstring>
 #include <limits>
 
 #include "prescene/core/random.h"
 #include "prescene/interfaces/ros_messages/conversions.h"
+#include "tests/support/laws.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -209,7 +209,7 @@ TEST(ColorImages, RefuseOthersByName) {
 }
 
 TEST(ImageLaws, GoThereAndBack) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const auto width = static_cast<int>(1 + stream.uniform_below(20));
     const auto height = static_cast<int>(1 + stream.uniform_below(20));

@@ -150,7 +150,7 @@ std::string random_word(core::RandomStream& stream) {
 }
 
 TEST(EditDistanceLaws, IsSymmetricZeroForEqualsOnlyAndOneForEachSlip) {
-  EXPECT_TRUE(rc::check([](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([](std::uint64_t seed) {
     core::RandomStream stream(seed, core::Purpose::kTest);
     const std::string a = random_word(stream), b = random_word(stream);
     RC_ASSERT(core::edit_distance(a, b) == core::edit_distance(b, a));

@@ -69,7 +69,7 @@ std::vector<belief::ObjectBelief> beliefs_of(const belief::Scene& scene) {
 
 TEST(LearnedFileLaws, PriorsReadBackEqualWhatWasWritten) {
   const belief::Scene known = scene();
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, core::Purpose::kTest);
     std::vector<belief::ObjectBelief> objects = beliefs_of(known);
     for (belief::ObjectBelief& object : objects)
@@ -91,7 +91,7 @@ TEST(LearnedFileLaws, PriorsReadBackEqualWhatWasWritten) {
 
 TEST(LearnedFileLaws, ValuesOfModelsReadBackEqualWhatWasWritten) {
   belief::Scene known = scene();
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, core::Purpose::kTest);
     belief::Scene fitted = known;
     for (belief::ObjectModel& model : fitted.models) {

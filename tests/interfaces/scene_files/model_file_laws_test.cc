@@ -89,7 +89,7 @@ ModelFile random_model(RandomStream& stream) {
 TEST(ModelFileLaws, WhatIsWrittenIsReadBackToTheBit) {
   const tests::ScratchDir folder;
   const std::filesystem::path path = folder.path() / "model.yaml";
-  EXPECT_TRUE(rc::check([&](std::uint64_t seed) {
+  EXPECT_TRUE(tests::check_law([&](std::uint64_t seed) {
     RandomStream stream(seed, core::Purpose::kTest);
     ModelFile file = random_model(stream);
     file.remarks = {"found: nothing\nwrong"};
