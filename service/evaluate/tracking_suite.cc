@@ -182,13 +182,6 @@ std::vector<std::string> row_of(const std::string& kind, const TrackingFigures& 
           f.frames > 0 ? fixed_text(1e3 * f.cpu_seconds / f.frames, 0) : "-"};
 }
 
-/// Of all sequences, for those who named another.
-std::string kinds_text() {
-  std::string text;
-  for (const std::string& kind : suite_kinds()) text += kind + ", ";
-  return text + "or " + kCarriedCube;
-}
-
 }  // namespace
 
 void TrackingFigures::add(const TrackingFigures& more) {

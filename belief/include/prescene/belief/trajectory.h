@@ -14,8 +14,8 @@ namespace prescene::belief {
 /// Why an instance ended. kDecided: what was asked of it could not change any more; it was not run to rest.
 enum class TrajectoryEnd { kAtRest, kDuration, kLeftTheWorld, kDiverged, kCancelled, kDecided };
 
-/// Two things touched during [begin, end], s since the scene's start. Bodies are numbered objects first, then supports, then robot bodies, in the
-/// scene's order; pushers made by actions follow. first < second.
+/// Two things touched during [begin, end], s since the scene's start. Bodies are numbered objects first, then supports,
+/// then robot bodies, in the scene's order; pushers made by actions follow. first < second.
 struct ContactInterval {
   int first = 0;
   int second = 0;
