@@ -335,8 +335,7 @@ std::string unused_frames_text(std::size_t frames, std::size_t beliefs) {
   if (2 * beliefs >= frames) return {};
   return "beliefs of " + std::to_string(beliefs) + " of " + std::to_string(frames) +
          " frames came back, so objects may be lost and answers worse than they could be: the machine is too slow or "
-         "too "
-         "busy for frames at this rate; play them more slowly (--speed 0.2)";
+         "too busy for frames at this rate; play them more slowly (--speed 0.2)";
 }
 
 }  // namespace prescene::service
