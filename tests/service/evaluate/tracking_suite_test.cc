@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/service/evaluate/tracking_suite.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -152,26 +151,9 @@ TEST(TrackingSuite, RecordedDataThatAreNotThereAreAnErrorBeforeAnythingIsSimulat
   EXPECT_FALSE(begun);
 }
 
-TEST(TrackingSuite, DataThatIsNotThereIsSaidBeforeTheWork) {
-  core::ThreadPool pool(1);
-  TrackingOptions options;
-  options.kinds = {"juggling"};
-  const core::Status juggling = evaluate_tracking({}, options, 1, pool, {}, nullptr).status();
-  for (const std::string& kind : suite_kinds()) EXPECT_THAT(juggling.message(), testing::HasSubstr(kind));
-  options.kinds = {kCarriedCube};
-  EXPECT_THAT(evaluate_tracking({}, options, 1, pool, {}, nullptr).status().message(), testing::HasSubstr("--data"));
-  options.kinds = {};
-  int sequences = 0;
-  const core::ProgressSink count = [&](const core::Progress&) { ++sequences; };
-  const tests::ScratchDir empty;
-  EXPECT_EQ(evaluate_tracking(empty.path(), options, 1, pool, count, nullptr).status().code(),
-            core::StatusCode::kNotFound);
-  EXPECT_EQ(sequences, 0);
-}
-
 TEST(TrackingSuite, KeptRecordingsAreUsedAgainOnlyWhereTheyAreWholeAndOfTheSameRate) {
   core::ThreadPool pool(1);
-  const tests::ScratchDir folder;
+  const prescene::tests::ScratchDir folder;
   TrackingOptions options;
   options.sequences = 1;
   options.kinds = {"taken_away"};
