@@ -240,7 +240,7 @@ core::Result<TrackingReport> evaluate_tracking(const fs::path& data, const Track
       for (int k = 0; k < options.sequences; ++k) sequences.push_back({kind, seed + static_cast<std::uint64_t>(k)});
   const double parts = static_cast<double>(sequences.size()) + (cube ? options.sequences : 0);
 
-  TrackingReport report;
+  TrackingReport report{.seed = seed, .rate = options.rate, .rows = {}, .simulated = {}};
   double done = 0.0;
   for (const Sequence& sequence : sequences) {
     const std::string name = sequence.kind + " " + std::to_string(sequence.seed);
@@ -277,7 +277,8 @@ ordered_json to_json(const TrackingReport& report) {
     json.update(figures_json(row.figures));
     kinds.push_back(std::move(json));
   }
-  return {{"kinds", kinds}, {"simulated", figures_json(report.simulated)}};
+  return {
+      {"seed", report.seed}, {"rate", report.rate}, {"kinds", kinds}, {"simulated", figures_json(report.simulated)}};
 }
 
 std::vector<std::vector<std::string>> table_of(const TrackingReport& report) {

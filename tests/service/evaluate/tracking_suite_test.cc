@@ -123,7 +123,10 @@ TEST(TrackingSuite, TracksASequenceOfEachKindThatIsAskedFor) {
   EXPECT_EQ(report->simulated.sequences, 1);
   EXPECT_GE(report->simulated.frames, 24);
   EXPECT_GT(report->simulated.visible, report->simulated.frames);  // two of the three objects stay
-  EXPECT_FALSE(to_json(*report)["simulated"]["share_tracked"].is_null());
+  const auto json = to_json(*report);
+  EXPECT_FALSE(json["simulated"]["share_tracked"].is_null());
+  EXPECT_EQ(json["seed"], 3);
+  EXPECT_EQ(json["rate"], 10.0);
 }
 
 TEST(TrackingSuite, NamesTheKindsThatThereAre) {

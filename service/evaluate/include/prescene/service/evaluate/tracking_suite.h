@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -64,6 +65,8 @@ struct TrackingOptions {
 };
 
 struct TrackingReport {
+  std::uint64_t seed = 0;  ///< Of the first sequence of each kind.
+  double rate = 0.0;       ///< Simulated frames a second.
   std::vector<TrackingRow> rows;
   TrackingFigures simulated;  ///< The sum over simulated kinds.
 };
