@@ -10,6 +10,7 @@
 #include "bag_metadata.h"
 #include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/mcap/mcap_reader.h"
+#include "prescene/interfaces/mcap/mcap_writer.h"
 
 namespace prescene::interfaces {
 namespace {
@@ -31,6 +32,7 @@ struct Span {
 
 struct BagTopic {
   std::string encoding;
+  std::string offered_qos = offered_qos_profiles(/*is_latched=*/false);
   std::uint64_t messages = 0;
 };
 /// By name and type.
@@ -45,6 +47,8 @@ Result<Span> take_file(const std::filesystem::path& file, BagTopics& topics) {
   const auto add = [&topics](const McapChannel& channel, std::uint64_t messages) {
     BagTopic& topic = topics[{channel.topic, channel.schema.name}];
     topic.encoding = channel.message_encoding;
+    const auto offered = channel.metadata.find(kOfferedQosKey);
+    if (offered != channel.metadata.end() && !offered->second.empty()) topic.offered_qos = offered->second;
     topic.messages += messages;
   };
   if (const auto known = reader->statistics()) {
@@ -78,17 +82,6 @@ std::string quoted_yaml(const std::string& text) {
   return out + "\"";
 }
 
-/// A list of one profile, as text in YAML: reliable (1), keep last (1), volatile (2) or transient local (1), without
-/// deadlines, which are then as long as ROS can say.
-std::string offered_profiles(bool is_latched) {
-  const auto never = [](const std::string& key) {
-    return "  " + key + ":\n    sec: 9223372036\n    nsec: 854775807\n";
-  };
-  return std::string("- history: 1\n  depth: 10\n  reliability: 1\n  durability: ") + (is_latched ? "1" : "2") + "\n" +
-         never("deadline") + never("lifespan") + "  liveliness: 1\n" + never("liveliness_lease_duration") +
-         "  avoid_ros_namespace_conventions: false";
-}
-
 std::string times_text(const Span& span, const std::string& indent) {
   return indent + "duration:\n" + indent + "  nanoseconds: " + std::to_string(span.last_ns - span.first_ns) + "\n" +
          indent + "starting_time:\n" + indent + "  nanoseconds_since_epoch: " + std::to_string(span.first_ns) + "\n" +
@@ -97,8 +90,7 @@ std::string times_text(const Span& span, const std::string& indent) {
 
 }  // namespace
 
-Status write_bag_metadata(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& files,
-                          const std::set<std::string>& latched) {
+Status write_bag_metadata(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& files) {
   BagTopics topics;
   Span all;
   std::string paths, of_files;
@@ -115,7 +107,7 @@ Status write_bag_metadata(const std::filesystem::path& folder, const std::vector
     text += "    - topic_metadata:\n        name: " + quoted_yaml(key.first) +
             "\n        type: " + quoted_yaml(key.second) +
             "\n        serialization_format: " + quoted_yaml(topic.encoding) +
-            "\n        offered_qos_profiles: " + quoted_yaml(offered_profiles(latched.contains(key.first))) +
+            "\n        offered_qos_profiles: " + quoted_yaml(topic.offered_qos) +
             "\n      message_count: " + std::to_string(topic.messages) + "\n";
   }
   // The compression of MCAP's chunks is none of rosbag2's.

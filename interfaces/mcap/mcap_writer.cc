@@ -387,14 +387,25 @@ Status McapWriter::close() {
   return impl.failure;
 }
 
-McapChannel ros_channel(const std::string& topic, const std::string& type) {
+std::string offered_qos_profiles(bool is_latched) {
+  const auto never = [](const std::string& key) {  // as long as ROS can say
+    return "  " + key + ":\n    sec: 9223372036\n    nsec: 854775807\n";
+  };
+  // Keep last (1); reliable (1); transient local (1) or volatile (2).
+  return std::string("- history: 1\n  depth: 10\n  reliability: 1\n  durability: ") + (is_latched ? "1" : "2") + "\n" +
+         never("deadline") + never("lifespan") + "  liveliness: 1\n" + never("liveliness_lease_duration") +
+         "  avoid_ros_namespace_conventions: false";
+}
+
+McapChannel ros_channel(const std::string& topic, const std::string& type, bool is_latched) {
   const RosType* ros = find_ros_type(type);
   PRESCENE_CHECK_MSG(ros != nullptr, type);
   McapChannel channel;
   channel.topic = topic;
   channel.message_encoding = "cdr";
   channel.schema = {std::string(ros->name), "ros2msg", ros2msg_schema(*ros)};
-  channel.metadata = {{"offered_qos_profiles", ""}, {"topic_type_hash", std::string(ros->type_hash)}};
+  channel.metadata = {{kOfferedQosKey, offered_qos_profiles(is_latched)},
+                      {"topic_type_hash", std::string(ros->type_hash)}};
   return channel;
 }
 

@@ -60,8 +60,9 @@ core::Status take_recipe(const std::string& text, RecordOptions& options, VerbCo
 core::Status simulate_to(const std::filesystem::path& aside, const belief::Scene& scene, const std::string& text,
                          FilesOfScene files, const RecordOptions& options, std::uint64_t seed, Backends& backends,
                          BopDataset* labels, std::size_t& frames, VerbContext& context) {
-  PRESCENE_TRY(const auto recording,
-               RecordingWriter::create(aside, {options.simulate, text, seed, "", std::move(files)}));
+  RecordingInfo info{options.simulate, text, seed, "", std::move(files)};
+  info.tf_static = options.simulation.topics.tf_static;
+  PRESCENE_TRY(const auto recording, RecordingWriter::create(aside, info));
   SimulatedRecordingOptions simulation = options.simulation;
   simulation.on_frame = [&](const SimulatedFrame& frame) {
     ++frames;
@@ -86,10 +87,9 @@ class SimulatedBag {
     if (!is_new)
       return core::invalid_input("-o " + options.output + ": is there already; remove it, or name another folder");
     options.output = first_file_of_bag(folder).string();
-    return std::make_unique<SimulatedBag>(options.output, options.simulation.topics.tf_static);
+    return std::make_unique<SimulatedBag>(options.output);
   }
-  SimulatedBag(std::filesystem::path file, std::string tf_static)
-      : file_(std::move(file)), tf_static_(std::move(tf_static)) {}
+  explicit SimulatedBag(std::filesystem::path file) : file_(std::move(file)) {}
   SimulatedBag(const SimulatedBag&) = delete;
   SimulatedBag& operator=(const SimulatedBag&) = delete;
   ~SimulatedBag() {
@@ -98,12 +98,11 @@ class SimulatedBag {
   }
   core::Status finish() {
     is_finished_ = true;
-    return interfaces::write_bag_metadata(file_.parent_path(), {file_}, {tf_static_});
+    return interfaces::write_bag_metadata(file_.parent_path(), {file_});
   }
 
  private:
   std::filesystem::path file_;
-  std::string tf_static_;
   bool is_finished_ = false;
 };
 
@@ -198,12 +197,12 @@ core::Status record_bus(RecordOptions& options, VerbContext& context) {
     info.scene_file = options.scene;
     info.files = std::move(files);
   }
-  PRESCENE_TRY(const auto recording, RollingRecording::create(output, std::move(info),
-                                                              {.part = options.parts,
-                                                               .tf_static = cameras.front().topics.tf_static,
-                                                               .asked = options.output,
-                                                               .as_bag = names_bag(options.output)},
-                                                              context.log()));
+  info.tf_static = cameras.front().topics.tf_static;
+  PRESCENE_TRY(
+      const auto recording,
+      RollingRecording::create(output, std::move(info),
+                               {.part = options.parts, .asked = options.output, .as_bag = names_bag(options.output)},
+                               context.log()));
   PRESCENE_TRY(const std::uint64_t messages,
                record_topics(options.dds, cameras, context.cancellation(), context.log(), *recording));
   context.print({{"recording", output}, {"messages", messages}, {"simulated", false}},

@@ -69,15 +69,12 @@ core::Status run(ServeOptions& options, VerbContext& context) {
   std::unique_ptr<RollingRecording> recording;
   if (!options.record.empty()) {
     const std::string asked = std::exchange(options.record, live_recording_path(options.record, context));
-    PRESCENE_TRY(recording,
-                 RollingRecording::create(options.record,
-                                          {options.scene, text, context.options().seed,
-                                           belief::json_text(to_json(options.settings.tracker)), std::move(files)},
-                                          {.part = options.parts,
-                                           .tf_static = options.settings.tracker.topics.tf_static,
-                                           .asked = asked,
-                                           .as_bag = names_bag(asked)},
-                                          context.log()));
+    RecordingInfo info{options.scene, text, context.options().seed,
+                       belief::json_text(to_json(options.settings.tracker)), std::move(files)};
+    info.tf_static = options.settings.tracker.topics.tf_static;
+    PRESCENE_TRY(recording, RollingRecording::create(
+                                options.record, std::move(info),
+                                {.part = options.parts, .asked = asked, .as_bag = names_bag(asked)}, context.log()));
   }
   const auto started_with = [&options](const char* name, ParameterValue value, const char* description) {
     options.settings.started_with.push_back({name, description, std::move(value)});

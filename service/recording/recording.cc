@@ -8,7 +8,6 @@
 
 #include "prescene/interfaces/bytes/text.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
-#include "prescene/service/tracking/topics.h"
 #include "recording_format.h"
 
 namespace prescene::service {
@@ -77,6 +76,7 @@ core::Status RecordingWriter::begin(const RecordingInfo& info) {
   }
   metadata.values[kCrcKey] = crc_text(metadata.values);
   next_index_ = info.part.first_message;
+  tf_static_ = info.tf_static;
   return writer_->write_metadata(metadata);
 }
 
@@ -98,7 +98,7 @@ core::Status RecordingWriter::write(const std::string& topic, const std::string&
                                     std::span<const std::uint8_t> data) {
   auto found = channels_.find({topic, kind});
   if (found == channels_.end()) {
-    interfaces::McapChannel channel = interfaces::ros_channel(topic, type);
+    interfaces::McapChannel channel = interfaces::ros_channel(topic, type, topic == tf_static_);
     if (!kind.empty()) channel.metadata[kKindKey] = kind;
     PRESCENE_TRY(const int number, writer_->add_channel(channel));
     found = channels_.emplace(std::pair(topic, kind), number).first;

@@ -62,7 +62,7 @@ RollingRecording::RollingRecording(std::filesystem::path first, RecordingInfo in
       info_(std::move(info)),
       options_(options),
       log_(std::move(log)),
-      repeated_(options.tf_static) {
+      repeated_(info_.tf_static) {
   state_.file = first_;
   kept_.push_back(first_);
   if (options_.part.keep_bytes > 0)
@@ -227,7 +227,7 @@ core::Status RollingRecording::write_bag_metadata() const {
   std::error_code error;
   for (const std::filesystem::path& file : kept_)
     if (std::filesystem::exists(file, error)) files.push_back(file);
-  return interfaces::write_bag_metadata(first_.parent_path(), files, {options_.tf_static});
+  return interfaces::write_bag_metadata(first_.parent_path(), files);
 }
 
 }  // namespace prescene::service

@@ -10,6 +10,7 @@
 #include "prescene/belief/json.h"
 #include "prescene/core/utf8.h"
 #include "prescene/interfaces/bytes/file.h"
+#include "prescene/interfaces/mcap/mcap_reader.h"
 #include "prescene/interfaces/ros_messages/cdr.h"
 #include "prescene/service/recording/recording_overview.h"
 #include "prescene/service/tracking/topics.h"
@@ -93,6 +94,30 @@ TEST(Recording, IsNeverWrittenOverALiveOne) {
   }
   EXPECT_EQ(unused_recording_path(path), folder.path() / "run-3.mcap");
   EXPECT_EQ(unused_recording_path("/dev/null"), "/dev/null") << "no file that holds anything";
+}
+
+TEST(Recording, OffersTheStaticTransformsToWhoComesLater) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "run.mcap";
+  RecordingInfo info;
+  info.tf_static = "/robot/fixed";
+  {
+    auto writer = RecordingWriter::create(path, info);
+    ASSERT_TRUE(writer.ok()) << writer.status().message();
+    for (const char* topic : {"/robot/fixed", "/tf_static", "/tf"})
+      ASSERT_TRUE((*writer)->write(
+          {topic, "tf2_msgs/msg/TFMessage", interfaces::encode_cdr(interfaces::RosTfMessage{}), 1, 1}));
+    ASSERT_TRUE((*writer)->close().ok());
+  }
+  const auto reader = interfaces::McapReader::open(path);
+  ASSERT_TRUE(reader.ok()) << reader.status().message();
+  while (const auto message = *(*reader)->next()) {
+    const interfaces::McapChannel& channel = (*reader)->channels()[static_cast<std::size_t>(message->channel)];
+    EXPECT_EQ(channel.metadata.at(interfaces::kOfferedQosKey),
+              interfaces::offered_qos_profiles(channel.topic == "/robot/fixed"))
+        << channel.topic;
+  }
+  EXPECT_EQ((*reader)->channels().size(), 3u);
 }
 
 TEST(Recording, KeepsMessagesInOrderWithTheirNumbers) {

@@ -54,7 +54,7 @@ class BagWriter : public testing::Test {
     ASSERT_TRUE(writer.ok()) << writer.status().message();
     for (const auto& [topic, time] : messages) {
       const std::string type = topic.starts_with("/tf") ? "tf2_msgs/msg/TFMessage" : "std_msgs/msg/String";
-      const auto channel = (*writer)->add_channel(ros_channel(topic, type));
+      const auto channel = (*writer)->add_channel(ros_channel(topic, type, topic == "/tf_static"));
       ASSERT_TRUE(channel.ok());
       ASSERT_TRUE((*writer)->write({*channel, 0, kStart + time, kStart + time, {0, 1, 0, 0}}).ok());
     }
@@ -76,8 +76,7 @@ class BagWriter : public testing::Test {
 TEST_F(BagWriter, EveryFieldOfVersionFiveIsThere) {
   write("run_0.mcap", {{"/tf_static", 0}, {"/a", 10}, {"/a", 30}});
   write("run_0_0001.mcap", {{"/tf", 40}, {"/a", 35}});
-  const core::Status written =
-      write_bag_metadata(folder_.path(), {path("run_0.mcap"), path("run_0_0001.mcap")}, {"/tf_static"});
+  const core::Status written = write_bag_metadata(folder_.path(), {path("run_0.mcap"), path("run_0_0001.mcap")});
   ASSERT_TRUE(written.ok()) << written.message();
 
   const LocatedValue bag = information();
@@ -148,8 +147,7 @@ TEST_F(BagWriter, OurReaderReadsTheBagWithAndWithoutItsMetadata) {
   // As a recorder leaves it that was killed.
   EXPECT_THAT(times(), ElementsAre(10, 20, 30));
   ASSERT_TRUE(
-      write_bag_metadata(folder_.path(), {path("run_0.mcap"), path("run_0_0001.mcap"), path("run_0_0002.mcap")}, {})
-          .ok());
+      write_bag_metadata(folder_.path(), {path("run_0.mcap"), path("run_0_0001.mcap"), path("run_0_0002.mcap")}).ok());
   EXPECT_THAT(times(), ElementsAre(10, 20, 30));
   EXPECT_EQ((*BagReader::open(folder_.path()))->message_count(), 3u);
   EXPECT_EQ((*BagReader::open(folder_.path()))->loss_text(), "");
@@ -162,7 +160,7 @@ TEST_F(BagWriter, OurReaderReadsTheBagWithAndWithoutItsMetadata) {
 TEST_F(BagWriter, AFileThatWasCutIsCountedByReadingIt) {
   write("run_0.mcap", {{"/a", 10}, {"/a", 25}}, /*is_cut=*/true);
   std::filesystem::rename(path("copy"), path("run_0.mcap"));
-  ASSERT_TRUE(write_bag_metadata(folder_.path(), {path("run_0.mcap")}, {}).ok());
+  ASSERT_TRUE(write_bag_metadata(folder_.path(), {path("run_0.mcap")}).ok());
   const LocatedValue bag = information();
   EXPECT_EQ(number_of(&bag, "message_count"), 2);
   EXPECT_EQ(start_of(bag), kStart + 10);
@@ -171,7 +169,7 @@ TEST_F(BagWriter, AFileThatWasCutIsCountedByReadingIt) {
 
 TEST_F(BagWriter, ABagWithoutMessagesIsOne) {
   write("run_0.mcap", {});
-  ASSERT_TRUE(write_bag_metadata(folder_.path(), {path("run_0.mcap")}, {}).ok());
+  ASSERT_TRUE(write_bag_metadata(folder_.path(), {path("run_0.mcap")}).ok());
   const LocatedValue bag = information();
   EXPECT_EQ(number_of(&bag, "message_count"), 0);
   EXPECT_EQ(duration_of(bag), 0);

@@ -170,7 +170,9 @@ TEST(McapWriter, RosChannelsCarrySchemaHashAndQos) {
   EXPECT_EQ(channel.schema.encoding, "ros2msg");
   EXPECT_EQ(channel.schema.data, ros2msg_schema(ros_type<RosImage>()));
   EXPECT_EQ(channel.metadata.at("topic_type_hash"), ros_type<RosImage>().type_hash);
-  EXPECT_EQ(channel.metadata.count("offered_qos_profiles"), 1U);
+  EXPECT_EQ(channel.metadata.at("offered_qos_profiles"), offered_qos_profiles(false));
+  EXPECT_EQ(ros_channel("/tf_static", "tf2_msgs/msg/TFMessage", true).metadata.at("offered_qos_profiles"),
+            offered_qos_profiles(true));
 }
 
 TEST(McapWriter, RosMessagesGoThroughARecording) {

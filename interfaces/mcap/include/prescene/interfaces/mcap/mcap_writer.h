@@ -76,7 +76,13 @@ class McapWriter {
   std::unique_ptr<Impl> impl_;
 };
 
+/// The key of a channel's metadata under which rosbag2 looks for the qualities of service to play it with.
+inline constexpr const char* kOfferedQosKey = "offered_qos_profiles";
+/// The text under that key, in YAML as up to version 8 of rosbag2's metadata, which later ones read, too: one profile,
+/// reliable and without deadlines; `is_latched`: offered to readers that come later, too.
+std::string offered_qos_profiles(bool is_latched);
+
 /// The channel of a ROS 2 type of ros_messages/schemas.h (checked), with rosbag2's metadata and the type's hash.
-McapChannel ros_channel(const std::string& topic, const std::string& type);
+McapChannel ros_channel(const std::string& topic, const std::string& type, bool is_latched = false);
 
 }  // namespace prescene::interfaces

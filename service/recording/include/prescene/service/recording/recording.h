@@ -21,6 +21,7 @@
 #include "prescene/interfaces/mcap/mcap_writer.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/tracking/step_record.h"
+#include "prescene/service/tracking/topics.h"
 
 namespace prescene::service {
 
@@ -49,6 +50,9 @@ struct RecordingInfo {
   /// RecordingReader leaves it empty: its read_attached() gives single files.
   std::optional<FilesOfScene> files = std::nullopt;
   RecordingPart part = {};
+  /// The topic of the static transforms. Players of ROS offer these to readers that come later, too. RecordingReader
+  /// does not fill it.
+  std::string tf_static = InputTopics{}.tf_static;
 };
 
 /// Where to record a robot: `path`, or where that is a recording already (a file, or one of its parts), "run-2.mcap",
@@ -140,6 +144,7 @@ class RecordingWriter {
   std::map<std::pair<std::string, std::string>, int> channels_;  // by topic and kind: /tf is the robot's and ours
   std::map<std::string, std::uint32_t> sequences_;               // of what is ours
   MessageIndex next_index_ = 0;
+  std::string tf_static_;
 };
 
 /// Where one of several files begins.

@@ -59,8 +59,6 @@ struct RollingOptions {
   double pause = 10.0;
   /// Bytes that have to be free on the disk for such a try.
   std::uint64_t room = std::uint64_t{64} << 20;
-  /// The topic of the static transforms.
-  std::string tf_static = InputTopics{}.tf_static;
   /// The name that was asked for, where unused_recording_path() gave another; "" = it did not.
   std::filesystem::path asked = {};
   /// The file is in a new folder, which becomes a bag of rosbag2: create() makes it, and close() writes its
