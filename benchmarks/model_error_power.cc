@@ -9,18 +9,20 @@
 #include "benchmarks/dice.h"
 #include "benchmarks/simulator_laws.h"
 #include "prescene/core/check.h"
+#include "prescene/geometry/primitives.h"
 #include "prescene/queries/query_engine.h"
 #include "prescene/service/backends.h"
 #include "prescene/simulation/outcomes/outcome_estimator.h"
 #include "prescene/simulation/similarity.h"
 #include "tests/support/engine_scenes.h"
+#include "tests/support/simple_scenes.h"
 #include "tests/support/uncertain_scenes.h"
 
 namespace prescene::benchmarks {
 namespace {
 
 constexpr double kShift = 0.03;                        // that is to be found
-constexpr int kFirstPairs = 512;                       // that show most scenes to have none
+constexpr std::array kFirstPairs = {128, 512};         // that show most scenes to have none
 constexpr int kPairs = 4096;                           // by which a scene is known to have one
 constexpr double kLeastStep = 3e-3, kMostStep = 9e-3;  // s, of things of 10 cm; twice the step must be allowed
 constexpr int kMostTries = 40;                         // scenes looked at, for each one that is wanted
@@ -74,19 +76,49 @@ void make_certain(belief::Scene& scene) {
   }
 }
 
-/// A scene of one of three kinds, with a step between 3 and 9 ms for things of 10 cm.
+/// A prism of steel that is let go a little tilted, and whether it still rocks by some tenths of a degree after a
+/// while: it strikes the floor with one corner after the other, many times in a step.
+tests::NamedScene random_prism(core::RandomStream& stream) {
+  const int corners = 6 + static_cast<int>(15.0 * stream.uniform());
+  const double radius = 0.015 + 0.035 * stream.uniform(), height = radius * (4.0 + 4.0 * stream.uniform());
+  const geometry::TriangleMesh mesh = geometry::make_mesh(geometry::Cylinder{radius, height}, corners);
+  const belief::MeshShape shape{std::make_shared<const geometry::TriangleMesh>(mesh), {}};
+  belief::Scene scene = tests::floor_scene(tests::model_of("prism", {shape}, 7800.0 * 3.0 * radius * radius * height));
+  belief::SceneObject& prism = scene.objects[0];
+  belief::NormalPose pose;
+  pose.mean.rotation = geometry::exp_rotation({0.04 + 0.08 * stream.uniform(), 0.0, 0.0});
+  double lowest = 0.0;
+  for (const geometry::Vector3d& vertex : mesh.vertices) lowest = std::min(lowest, (pose.mean.rotation * vertex).z());
+  pose.mean.translation.z() = 0.002 - lowest;
+  pose.covariance.diagonal() << 1e-4, 1e-4, 1.0, 0.0, 0.0, 0.0;
+  prism.pose = pose;
+  belief::Outcome rocks;
+  rocks.name = "rocks";
+  rocks.object = prism.name;
+  belief::Condition upright;
+  upright.predicate = belief::UprightWithin{geometry::Vector3d::UnitZ(), 0.002 + 0.01 * stream.uniform()};
+  upright.negated = true;
+  rocks.all_of = {upright};
+  scene.outcomes = {rocks};
+  scene.duration = 0.5 + 2.0 * stream.uniform();
+  return {"prism", std::make_shared<const belief::Scene>(std::move(scene))};
+}
+
+/// A scene of one of four kinds, with a step between 3 and 9 ms for things of 10 cm.
 tests::NamedScene random_scene(core::RandomStream& stream) {
   static const std::vector<tests::EngineScene> kEngineScenes = tests::engine_scenes();
   static const std::vector<tests::NamedScene> kUncertainScenes = tests::uncertain_scenes();
-  const double kind = 3.0 * stream.uniform();
+  const double kind = 4.0 * stream.uniform();
   tests::NamedScene named;
   if (kind < 1.0) {
     named = random_die(stream);
   } else if (kind < 2.5) {
     const auto& [name, scene] = picked(kEngineScenes, stream);
     named = {name, scene};
-  } else {
+  } else if (kind < 3.0) {
     named = picked(kUncertainScenes, stream);
+  } else {
+    named = random_prism(stream);
   }
   belief::Scene scene = *named.scene;
   make_certain(scene);
@@ -174,7 +206,9 @@ Table measure_model_error(int scenes, Report* report) {
     service::Backends backends(pool);  // Keeps the shapes of its scenes.
     const tests::NamedScene named = random_scene(stream);
     const auto seed = static_cast<std::uint64_t>(1000 + tries++);
-    if (true_shift(named.scene, kFirstPairs, backends, seed, pool).most < kShift) continue;
+    if (std::any_of(kFirstPairs.begin(), kFirstPairs.end(),
+                    [&](int pairs) { return true_shift(named.scene, pairs, backends, seed, pool).most < kShift; }))
+      continue;
     const TrueShift shift = true_shift(named.scene, kPairs, backends, seed, pool);
     if (shift.least < kShift) continue;
     ++with_shift;
