@@ -11,10 +11,12 @@ core::Status forecast_flight(const Foresight& foresight, const Prior& prior, con
   if (!context.shapes) return core::ok_status();
   const belief::Scene& scene = *foresight.scene;
   if (!scene.joints.empty()) return core::unsupported("flights of things on joints are not followed");
-  const auto bodies = simulation::FlightBodies::make(scene, *context.shapes);
+  const double length_scale = foresight.simulator->length_scale();
+  const auto bodies = simulation::FlightBodies::make(scene, *context.shapes, length_scale);
   if (!bodies) return core::ok_status();
-  const auto flight = simulation::common_flight(scene, *bodies, prior.starts, foresight.request, context.make_simulator,
-                                                prior.stream, *context.pool, {}, context.cancellation);
+  const auto flight =
+      simulation::common_flight(scene, *bodies, prior.starts, foresight.request, context.make_simulator, prior.stream,
+                                *context.pool, simulation::CommonFlightOptions::of(length_scale), context.cancellation);
   if (!flight) return flight.status().code() == core::StatusCode::kCancelled ? core::ok_status() : flight.status();
   belief::FlightForecast& forecast = answer.flight.emplace();
   forecast.apart_until = flight->apart_until;

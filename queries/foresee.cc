@@ -87,11 +87,11 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   if (foresight.variables.empty()) options.min_instances = kUnaskedInstances;
   // What is certain of a free body is not of one on a joint.
   if (!detail.to_rest && !foresight.variables.empty() && foresight.scene->joints.empty())
-    foresight.certifier =
-        simulation::make_certifier(foresight.scene, foresight.variables, foresight.request,
-                                   {.shapes = context.shapes,
-                                    .edge_rounding = context.edge_rounding * foresight.simulator->length_scale(),
-                                    .cancellation = &until});
+    foresight.certifier = simulation::make_certifier(foresight.scene, foresight.variables, foresight.request,
+                                                     {.shapes = context.shapes,
+                                                      .edge_rounding = context.edge_rounding,
+                                                      .length_scale = foresight.simulator->length_scale(),
+                                                      .cancellation = &until});
   options.certifier = foresight.certifier.get();
   if (detail.so_far)
     options.on_look = [&](const simulation::OutcomeEstimate& so_far) { detail.so_far(foresight, so_far); };

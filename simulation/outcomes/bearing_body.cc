@@ -17,6 +17,7 @@ namespace {
 
 using geometry::Pose;
 
+// Of things of household size:
 // m: faces are not moved further inwards than this.
 constexpr double kMostInset = 1e-3;
 constexpr int kHalvings = 10;
@@ -82,7 +83,7 @@ core::Result<double> depth_in(const geometry::TriangleMesh& mesh, const Vector3d
 }  // namespace
 
 std::optional<BearingBody> bearing_body(const std::vector<belief::CollisionShape>& shapes, const ConvexPolytope& hull,
-                                        const Vector3d& center_of_mass_O, ShapeStore& store) {
+                                        const Vector3d& center_of_mass_O, ShapeStore& store, double length_scale) {
   BearingBody body;
   std::vector<BearingPatch> patches;
   std::vector<Vector3d> vertices;  // of what has no spheres
@@ -99,7 +100,7 @@ std::optional<BearingBody> bearing_body(const std::vector<belief::CollisionShape
     body.rise = std::max(body.rise, static_cast<double>((*spheres)->rise));
     const auto depth = depth_in(*mesh->mesh, mesh->X_OS.inverse() * center_of_mass_O);
     if (!depth) return std::nullopt;
-    body.inner_radius = std::max(body.inner_radius, *depth - kSunk);
+    body.inner_radius = std::max(body.inner_radius, *depth - kSunk * length_scale);
   }
 
   std::vector<Vector3d> directions = directions_over_the_sphere();
@@ -110,10 +111,10 @@ std::optional<BearingBody> bearing_body(const std::vector<belief::CollisionShape
     reaches.push_back(std::max(reach_of(vertices, direction), reach_of(patches, direction)));
   const auto holds = [&](const ConvexPolytope& polytope) {
     for (std::size_t i = 0; i < directions.size(); ++i)
-      if (reach_of(polytope.vertices, directions[i]) > reaches[i] + kShort) return false;
+      if (reach_of(polytope.vertices, directions[i]) > reaches[i] + kShort * length_scale) return false;
     return true;
   };
-  double low = 0.0, high = kMostInset;
+  double low = 0.0, high = kMostInset * length_scale;
   std::optional<ConvexPolytope> best = inset(hull, high);
   if (!best || !holds(*best)) return std::nullopt;
   for (int i = 0; i < kHalvings; ++i) {

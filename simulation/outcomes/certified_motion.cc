@@ -7,41 +7,35 @@
 
 #include "prescene/simulation/outcomes/bearing_body.h"
 #include "prescene/simulation/rules/contact_rules.h"
+#include "prescene/simulation/similarity.h"
 
 namespace prescene::simulation {
 namespace {
 
-// Room for what the integrator and the solver add to the energy, and for overlap that is pushed out (m).
+// Room for what the integrator and the solver add to the energy.
 constexpr double kEnergy = 1.05;
-constexpr double kRise = 5e-4;
-// m below a barrier that still counts as over it.
-constexpr double kBarrierRoom = 2.5e-4;
-// Sliding to a stop takes at most this many times what friction says, and this much more (m).
+// Sliding to a stop takes at most this many times what friction says.
 constexpr double kSlide = 1.25;
-constexpr double kSlideRoom = 3e-3;
 // rad: supports are level to this, and objects that others stand on.
 constexpr double kLevel = 1e-3;
 constexpr double kLevelObject = 0.02;
 // Share of its energy above the floor that a body keeps when it lands; more would be a bouncing ball.
 constexpr double kKeptInLanding = 0.75;
 constexpr double kBouncy = 0.7;
-// s: after it landed and bounced, a body has come down from its corner by then.
-constexpr double kCollapseTime = 0.5;
-// m beyond the side of a thing from which a convex body that tips over that side does not come back.
-constexpr double kTipped = 5e-3;
 // A body rolls over edges that lift its centre of mass by less than this share.
 constexpr double kRollingRise = 0.05;
 
 /// Level direction in which the body tips off the side of a thing, over which its centre of mass is already: x, y, -x
 /// or -y as 0 to 3.
-std::optional<int> tips_off(const SureMotion& motion, const geometry::Box& thing, const Vector3d& relative_velocity) {
+std::optional<int> tips_off(const SureMotion& motion, const geometry::Box& thing, const Vector3d& relative_velocity,
+                            double tipped) {
   if (relative_velocity.z() > 0.0) return std::nullopt;
   for (int side = 0; side < 4; ++side) {
     const int k = side % 2;
     const double sign = side < 2 ? 1.0 : -1.0;
     const double beyond = sign > 0.0 ? motion.center[k] - thing.max()[k] : thing.min()[k] - motion.center[k];
     const Vector3d tipping_axis = Vector3d::UnitZ().cross(sign * Vector3d::Unit(k));
-    if (beyond >= kTipped && sign * relative_velocity[k] >= 0.0 && motion.angular_velocity.dot(tipping_axis) >= 0.0)
+    if (beyond >= tipped && sign * relative_velocity[k] >= 0.0 && motion.angular_velocity.dot(tipping_axis) >= 0.0)
       return side;
   }
   return std::nullopt;
@@ -69,7 +63,8 @@ bool rolls(const ConvexPolytope& hull, const Vector3d& center_of_mass) {
   return false;
 }
 
-std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model, const CertifierOptions& options) {
+std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model, const CertifierOptions& options,
+                                                const Rooms& rooms) {
   auto hull = make_polytope(belief::collision_mesh(model).vertices);
   if (!hull) return std::nullopt;
   CertifiedObject object;
@@ -77,17 +72,17 @@ std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model
   object.bearing = object.hull;
   object.shapes = shape_hulls(model.collision);
   object.center_of_mass = belief::mean(model.center_of_mass);
-  object.center_play = belief::dimensions(model.center_of_mass) > 0 ? 2e-3 : 1e-9;
+  object.center_play = belief::dimensions(model.center_of_mass) > 0 ? rooms.center : 1e-9 * options.length_scale;
   if (collides_as_spheres(model.collision)) {
     if (!options.shapes) return std::nullopt;
     std::optional<BearingBody> body =
-        bearing_body(model.collision, object.hull, object.center_of_mass, *options.shapes);
+        bearing_body(model.collision, object.hull, object.center_of_mass, *options.shapes, options.length_scale);
     if (!body) return std::nullopt;
     object.bearing = std::move(body->polytope);
     object.rise = body->rise;
     object.inner_radius = std::max(0.0, body->inner_radius - object.center_play);
   }
-  object.edge_radius = std::max(options.edge_rounding, model.contact.edge_radius);
+  object.edge_radius = std::max(options.edge_rounding * options.length_scale, model.contact.edge_radius);
   object.convex = model.collision.size() == 1 && object.shapes.size() == 1 && object.rise == 0.0;
   object.rolls = rolls(object.hull, object.center_of_mass);
   object.rolling_arm = model.contact.rolling_friction;
@@ -101,6 +96,15 @@ std::optional<CertifiedObject> certified_object(const belief::ObjectModel& model
 
 }  // namespace
 
+Rooms Rooms::of(double length_scale) {
+  Rooms rooms;
+  for (double* length : {&rooms.rise, &rooms.barrier, &rooms.slide, &rooms.tipped, &rooms.sunk, &rooms.beside,
+                         &rooms.air, &rooms.ball, &rooms.center})
+    *length *= length_scale;
+  for (double* time : {&rooms.settle_time, &rooms.collapse_time}) *time *= Similarity{length_scale}.time();
+  return rooms;
+}
+
 std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene& scene,
                                                              const CertifierOptions& options, double world_radius) {
   const Vector3d& gravity = scene.gravity_W;
@@ -109,12 +113,13 @@ std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene
   for (const belief::Support& support : scene.supports)
     if (collides_as_spheres(support.collision)) return nullptr;
   auto made = std::make_unique<MotionCertifier>();
-  made->options_ = options;
+  made->rooms_ = Rooms::of(options.length_scale);
+  made->shorten_arms_ = options.shorten_arms;
   made->world_radius_ = world_radius;
   made->gravity_ = -gravity.z();
   made->robot_ = !scene.robot.empty();
   for (const belief::SceneObject& object : scene.objects) {
-    std::optional<CertifiedObject> certified = certified_object(scene.model_of(object), options);
+    std::optional<CertifiedObject> certified = certified_object(scene.model_of(object), options, made->rooms_);
     if (!certified) return nullptr;
     made->objects_.push_back(*std::move(certified));
     made->unit_inertias_.push_back(scene.model_of(object).unit_inertia);
@@ -129,7 +134,8 @@ std::unique_ptr<const MotionCertifier> MotionCertifier::make(const belief::Scene
         std::min(belief::mean(contact.friction),
                  contact.impact_friction ? belief::mean(*contact.impact_friction) : belief::mean(contact.friction)));
     made->support_rolling_arm_.push_back(contact.rolling_friction);
-    made->support_edge_radius_ = std::max({made->support_edge_radius_, options.edge_rounding, contact.edge_radius});
+    made->support_edge_radius_ =
+        std::max({made->support_edge_radius_, options.edge_rounding * options.length_scale, contact.edge_radius});
     made->least_support_friction_ = std::min(made->least_support_friction_, made->support_friction_.back());
     for (const belief::CollisionShape& shape : support.collision) {
       const geometry::Box box =
@@ -224,20 +230,20 @@ void MotionCertifier::stand(const belief::WorldState& state, std::vector<SureMot
     const double upwards = relative.z() * relative.z() + turning + 2.0 * gravity_ * gap;
     motion.hop = 2.0 * std::sqrt(sideways * upwards) / gravity_;
     motion.slide_time = kSlide * std::sqrt(sideways) / (std::max(friction, 1e-6) * gravity_);
-    motion.reach = kSlide * sideways / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom + motion.hop;
+    motion.reach = kSlide * sideways / (2.0 * std::max(friction, 1e-6) * gravity_) + rooms_.slide + motion.hop;
     // What is below ends in round edges, too.
     const double round =
         on_support ? support_edge_radius_ : objects_[static_cast<std::size_t>(motion.base)].edge_radius;
     motion.inside = distance_inside(*best, foot) - round;
-    const double edge = options_.shorten_arms ? motion.inside - motion.reach : 1e30;
-    motion.trap = trap_of(objects_[i].bearing, state.objects[i].X_WO, physical.center_of_mass, motion.plane, edge,
-                          objects_[i].edge_radius);
+    const double edge = shorten_arms_ ? motion.inside - motion.reach : 1e30;
+    motion.trap = trap_of(objects_[i].bearing, state.objects[i].X_WO, physical.center_of_mass,
+                          {motion.plane, edge, rooms_.sunk}, objects_[i].edge_radius);
   }
 }
 
 double MotionCertifier::friction_about(const SureMotion& motion) const {
   double least = support_friction_[static_cast<std::size_t>(motion.base) - objects_.size()];
-  const Vector3d room = Vector3d::Constant(0.01);
+  const Vector3d room = Vector3d::Constant(rooms_.beside);
   geometry::Box about(motion.box.min() - room, motion.box.max() + room);
   about.min().z() = std::min(about.min().z(), motion.plane);
   for (const FixedShape& shape : shapes_)
@@ -260,7 +266,7 @@ std::vector<double> MotionCertifier::lowest_centers(const belief::WorldState& st
     }
     lowest[j] = motion.plane + motion.trap->lowest;
     energy += motion.weight * std::max(0.0, motion.center.z() - lowest[j]);
-    lowest_touch = std::min(lowest_touch, lowest[j] - objects_[j].outer_radius - kRise);
+    lowest_touch = std::min(lowest_touch, lowest[j] - objects_[j].outer_radius - rooms_.rise);
   }
   // One alone can give its energy to those that stay on their faces only where it touches one of them.
   if (free.size() == 1) lowest[free[0]] = std::max(-world_radius_, lowest_touch - objects_[free[0]].outer_radius);
@@ -269,7 +275,9 @@ std::vector<double> MotionCertifier::lowest_centers(const belief::WorldState& st
   // to its edge in the time that is left, or slides that far.
   for (const FixedFace& fixed : faces_) {
     const double height = fixed.face.height;
-    const auto center_above = [&](std::size_t j) { return height + std::max(0.0, objects_[j].inner_radius - kRise); };
+    const auto center_above = [&](std::size_t j) {
+      return height + std::max(0.0, objects_[j].inner_radius - rooms_.rise);
+    };
     double all = energy;
     for (const std::size_t j : free) all += motions[j].weight * std::max(0.0, motions[j].center.z() - center_above(j));
     const bool stay = std::ranges::all_of(free, [&](std::size_t j) {
@@ -279,7 +287,7 @@ std::vector<double> MotionCertifier::lowest_centers(const belief::WorldState& st
       if (objects_[j].rolls) friction = std::min(friction, objects_[j].rolling_arm / objects_[j].outer_radius);
       const double speed2 = 2.0 * gravity_ * all / motion.weight;
       const double way = std::min(std::sqrt(speed2) * seconds_left,
-                                  kSlide * speed2 / (2.0 * std::max(friction, 1e-6) * gravity_) + kSlideRoom);
+                                  kSlide * speed2 / (2.0 * std::max(friction, 1e-6) * gravity_) + rooms_.slide);
       return motion.center.z() > height &&
              distance_inside(fixed.face, motion.center.head<2>()) > way + objects_[j].outer_radius;
     });
@@ -306,11 +314,11 @@ void MotionCertifier::bound_heights(const belief::WorldState& state, double seco
     for (std::size_t j = 0; j < motions.size(); ++j) potential += falls_by(j);
     for (std::size_t i = 0; i < motions.size(); ++i) {
       SureMotion& motion = motions[i];
-      motion.highest = motion.center.z() + kRise + (kEnergy * kinetic + potential - falls_by(i)) / motion.weight;
+      motion.highest = motion.center.z() + rooms_.rise + (kEnergy * kinetic + potential - falls_by(i)) / motion.weight;
       if (!motion.trap) continue;
       const bool base_stays = motion.base >= static_cast<int>(motions.size()) ||
                               motions[static_cast<std::size_t>(motion.base)].trap.has_value();
-      if (base_stays && motion.highest - motion.plane < motion.trap->barrier - kBarrierRoom) continue;
+      if (base_stays && motion.highest - motion.plane < motion.trap->barrier - rooms_.barrier) continue;
       motion.trap.reset();
       changed = true;
       break;  // the others had counted on it
@@ -332,7 +340,8 @@ void MotionCertifier::let_roll(const belief::WorldState& state, std::vector<Sure
         alone_on_base(motions, i) ? std::max(known.rolling_arm, support_rolling_arm_[support]) : known.rolling_arm;
     const double resistance = std::min(friction, rolling_arm / (motion.highest - motion.plane));
     const double lowest = motion.plane + least_depth(known.bearing, physical.center_of_mass);
-    motion.reach = kSlide * (motion.highest - kRise - lowest) / std::max(resistance, 1e-9) + kSlideRoom + motion.hop;
+    motion.reach =
+        kSlide * (motion.highest - rooms_.rise - lowest) / std::max(resistance, 1e-9) + rooms_.slide + motion.hop;
     if (motion.reach < motion.inside) motion.lowest = lowest;
   }
 }
@@ -352,7 +361,8 @@ std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>&
     lowest_beside = std::min(lowest_beside, thing.max().z());
     if (disjoint_and_parting(motion.box, thing, relative_velocity)) return true;
     // Things on two sides could hold it between them.
-    const std::optional<int> side = objects_[object].convex ? tips_off(motion, thing, relative_velocity) : std::nullopt;
+    const std::optional<int> side =
+        objects_[object].convex ? tips_off(motion, thing, relative_velocity, rooms_.tipped) : std::nullopt;
     if (!side || side != tipped_side.value_or(*side)) return false;
     tipped_side = side;
     return true;
@@ -377,7 +387,7 @@ std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>&
   // Bounces take 2 e / (1 - e) of the time in which its speed of landing is gained.
   const double landing_speed = std::sqrt(2.0 * gravity_ * std::max(0.0, motion.highest - landing));
   const double bouncing = 2.0 * restitution / (1.0 - restitution) * landing_speed / gravity_;
-  if (seconds_left < time + (std::isfinite(floor) ? bouncing + kCollapseTime : 0.0)) return std::nullopt;
+  if (seconds_left < time + (std::isfinite(floor) ? bouncing + rooms_.collapse_time : 0.0)) return std::nullopt;
   const double sideways = motion.center.head<2>().norm() + time * motion.velocity.head<2>().norm();
   const double farthest_up = std::max(std::abs(motion.highest), std::abs(landing));
   if (std::hypot(sideways, farthest_up) + objects_[object].outer_radius >= world_radius_) return std::nullopt;
@@ -386,9 +396,9 @@ std::optional<double> MotionCertifier::landing_of(const std::vector<SureMotion>&
 
 bool MotionCertifier::alone_on_base(const std::vector<SureMotion>& motions, std::size_t object) const {
   const SureMotion& motion = motions[object];
-  const Vector3d room = Vector3d::Constant(motion.reach + 0.01);
+  const Vector3d room = Vector3d::Constant(motion.reach + rooms_.beside);
   geometry::Box around(motion.box.min() - room, motion.box.max() + room);
-  around.min().z() = motion.box.min().z() - 2e-3;
+  around.min().z() = motion.box.min().z() - rooms_.sunk;
   const auto count = static_cast<int>(objects_.size());
   for (const FixedShape& shape : shapes_)
     if (count + shape.support != motion.base && around.intersects(shape.box)) return false;

@@ -14,6 +14,24 @@
 
 namespace prescene::simulation {
 
+/// Rooms for what steppers do that bounds on energy don't know of. The values are of things of household size.
+struct Rooms {
+  double rise = 5e-4;          ///< m: overlap that is pushed out lifts bodies by less.
+  double barrier = 2.5e-4;     ///< m below a barrier that still counts as over it.
+  double slide = 3e-3;         ///< m: sliding to a stop may go on by this much more than friction says.
+  double tipped = 5e-3;        ///< m beyond the side of a thing from which a convex body does not come back.
+  double sunk = 2e-3;          ///< m: resting bodies sink less deep into what they lie on.
+  double beside = 0.01;        ///< m around a body within which things count as beside it.
+  double air = 0.03;           ///< m around a volume in which ways into it and out of it are looked for, at least.
+  double ball = 1e-3;          ///< m that surfaces come into the ball of SpillLevels: by sinking in, and by facets.
+  double center = 2e-3;        ///< m: play of an uncertain centre of mass.
+  double settle_time = 0.5;    ///< s: what stands on its face is at rest by then.
+  double collapse_time = 0.5;  ///< s: after it landed and bounced, a body has come down from its corner by then.
+
+  /// For instances that are simulated as similar ones (Simulator::length_scale()).
+  static Rooms of(double length_scale);
+};
+
 /// What of an object does not change from instance to instance.
 struct CertifiedObject {
   ConvexPolytope hull;                 ///< Of the whole body, in O.
@@ -61,6 +79,7 @@ class MotionCertifier {
                                                      double world_radius);
 
   const std::vector<CertifiedObject>& objects() const { return objects_; }
+  const Rooms& rooms() const { return rooms_; }
   /// Into `motions`; false where something is held, not as the scene says, or may leave the world.
   bool assess(const belief::WorldState& state, double seconds_left, std::vector<SureMotion>& motions) const;
   /// Nothing but `motions[object].base` is near enough to be touched while it stays there.
@@ -93,7 +112,8 @@ class MotionCertifier {
   std::optional<double> landing_of(const std::vector<SureMotion>& motions, std::size_t object, double restitution,
                                    double seconds_left) const;
 
-  CertifierOptions options_;
+  Rooms rooms_;
+  bool shorten_arms_ = true;
   double world_radius_ = 0.0;
   double gravity_ = 0.0;
   std::vector<CertifiedObject> objects_;

@@ -24,12 +24,8 @@ Truth when(bool yes, bool no) { return yes ? Truth::kYes : no ? Truth::kNo : Tru
 
 // rad: kept from where another answer begins.
 constexpr double kAngleRoom = 0.01;
-// s: what stands on its face is at rest by then.
-constexpr double kSettleTime = 0.5;
 // Share of its radius that a rounded corner lies inside of the sharp one.
 constexpr double kCornerLoss = 0.7320508;
-// m of air around a volume in which ways into it and out of it are looked for, at least.
-constexpr double kLeastAir = 0.03;
 
 /// Ways out of a volume and into it for the centre of mass of one object.
 struct Passage {
@@ -125,7 +121,7 @@ class Judge {
   }
   Truth operator()(const belief::RestingOn& resting) const {
     const std::optional<int> body = belief::body_index(scene_, resting.support);
-    if (!body || seconds_left_ < kSettleTime + motion_.slide_time) return Truth::kPerhaps;
+    if (!body || seconds_left_ < certifier_.rooms().settle_time + motion_.slide_time) return Truth::kPerhaps;
     const auto count = static_cast<int>(motions_.size());
     // Lying there it may still lean on what it can reach.
     if (motion_.landing && *body >= count)
@@ -252,10 +248,10 @@ class EnergyCertifier final : public Certifier {
 
 /// Surfaces are those of sharp things; contacts round their edges by up to `edge_radius`.
 Passage passage_of(const belief::InsideVolume& volume, const CertifiedObject& object,
-                   const std::vector<geometry::TriangleMesh>& surfaces, double edge_radius) {
+                   const std::vector<geometry::TriangleMesh>& surfaces, double edge_radius, const Rooms& rooms) {
   const double ball_radius = object.inner_radius - kCornerLoss * edge_radius;
   const double offset = object.center_of_mass.norm() + object.center_play;
-  const Vector3d air = Vector3d::Constant(std::max(kLeastAir, 2.0 * object.inner_radius));
+  const Vector3d air = Vector3d::Constant(std::max(rooms.air, 2.0 * object.inner_radius));
   const geometry::Box box = box_of(volume);
   const geometry::Box domain(box.min() - air, box.max() + air);
   const auto outside = [&](const Vector3d& low, const Vector3d& high) {
@@ -264,7 +260,8 @@ Passage passage_of(const belief::InsideVolume& volume, const CertifiedObject& ob
   const auto inside = [&](const Vector3d& low, const Vector3d& high) {
     return may_be_inside(volume, offset, low, high);
   };
-  const auto leave = std::make_shared<const SpillLevels>(surfaces, domain, ball_radius, outside, true);
+  const auto leave =
+      std::make_shared<const SpillLevels>(surfaces, domain, SpillBall{ball_radius, rooms.ball}, outside, true);
   return {leave, std::make_shared<const SpillLevels>(*leave, inside, false)};
 }
 
@@ -301,7 +298,8 @@ std::unique_ptr<const Certifier> make_certifier(const std::shared_ptr<const beli
         question.condition = condition;
         const auto* volume = std::get_if<belief::InsideVolume>(&condition.predicate);
         if (volume && objects[answer.object].inner_radius > kCornerLoss * motions->support_edge_radius())
-          question.passage = passage_of(*volume, objects[answer.object], surfaces, motions->support_edge_radius());
+          question.passage =
+              passage_of(*volume, objects[answer.object], surfaces, motions->support_edge_radius(), motions->rooms());
       }
     }
   }

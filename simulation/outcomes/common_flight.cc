@@ -11,6 +11,7 @@
 #include "prescene/collision/spheres/uncertain_shape_queries.h"
 #include "prescene/collision/spheres/uncertain_sphere_queries.h"
 #include "prescene/core/check.h"
+#include "prescene/simulation/similarity.h"
 
 namespace prescene::simulation {
 namespace {
@@ -22,14 +23,13 @@ using collision::UncertainPose;
 using geometry::Pose;
 using geometry::Vector6d;
 
-constexpr double kFarAway = 1e3;  // m: nothing leaves the world of flights
-
 /// The scene with one of its objects, nothing near enough to touch, and what is done with that object.
-belief::Scene alone(const belief::Scene& scene, std::size_t object) {
+belief::Scene alone(const belief::Scene& scene, std::size_t object, double far_away) {
   belief::Scene empty = scene;
   empty.supports.clear();
   for (belief::KinematicBody& body : empty.robot)
-    body.collision = {belief::PrimitiveShape{geometry::Sphere{0.001}, Pose::from_translation({0.0, 0.0, kFarAway})}};
+    body.collision = {
+        belief::PrimitiveShape{geometry::Sphere{1e-6 * far_away}, Pose::from_translation({0.0, 0.0, far_away})}};
   empty.objects = {scene.objects[object]};
   empty.outcomes.clear();
   empty.exclusive_outcomes.clear();
@@ -180,7 +180,7 @@ class Flyer {
                                const core::Cancellation* cancellation) {
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
       if (cancellation && cancellation->requested()) return core::cancelled("the flight was not followed to its end");
-      PRESCENE_TRY(auto simulator, make(alone(scene, i), 1.0));
+      PRESCENE_TRY(auto simulator, make(alone(scene, i, options_.far_away), 1.0));
       simulators_.push_back(std::move(simulator));
     }
     return core::ok_status();
@@ -192,7 +192,7 @@ class Flyer {
     RunRequest request;
     request.stop.duration = seconds;
     request.stop.stop_at_rest = false;
-    request.stop.world_radius = kFarAway;
+    request.stop.world_radius = options_.far_away;
     request.sample_interval = options_.interval;
     flights.assign(samplers_.size(), std::vector<Flights>(simulators_.size(), Flights(draws)));
     std::vector<belief::WorldState> states(draws);
@@ -235,6 +235,15 @@ std::vector<std::vector<bool>> held_pairs(const belief::Scene& scene, std::size_
 }
 
 }  // namespace
+
+CommonFlightOptions CommonFlightOptions::of(double length_scale) {
+  CommonFlightOptions options;
+  const double time_scale = Similarity{length_scale}.time();
+  options.interval *= time_scale;
+  options.longest *= time_scale;
+  options.far_away *= length_scale;
+  return options;
+}
 
 core::Result<CommonFlight> common_flight(const belief::Scene& scene, const FlightBodies& bodies,
                                          const StartDistribution& starts, const RunRequest& request,

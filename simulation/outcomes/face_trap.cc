@@ -7,13 +7,6 @@
 #include <numbers>
 
 namespace prescene::simulation {
-namespace {
-
-// m: how deep resting bodies sink into what they lie on, and more.
-constexpr double kFaceSunk = 2e-3;
-
-}  // namespace
-
 double distance_inside(const LevelFace& face, const Eigen::Vector2d& point) {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < face.polygon.size(); ++i) {
@@ -77,11 +70,11 @@ double Trap::tilt(double height) const {
 }
 
 std::optional<Trap> trap_of(const ConvexPolytope& hull, const Pose& X_WO, const Vector3d& center_of_mass_O,
-                            double plane_height, double longest_arm, double edge_radius) {
+                            const TrapPlane& plane, double edge_radius) {
   const Vector3d down_O = X_WO.rotation.conjugate() * Vector3d(0.0, 0.0, -1.0);
   double reach = 0.0;
   for (const Vector3d& v : hull.vertices) reach = std::max(reach, down_O.dot(v - center_of_mass_O));
-  if ((X_WO * center_of_mass_O).z() - reach < plane_height - kFaceSunk) return std::nullopt;
+  if ((X_WO * center_of_mass_O).z() - reach < plane.height - plane.sunk) return std::nullopt;
 
   // The face through which the vertical below the centre of mass leaves the body.
   const ConvexPolytope::Face* below = nullptr;
@@ -97,7 +90,7 @@ std::optional<Trap> trap_of(const ConvexPolytope& hull, const Pose& X_WO, const 
   }
   if (!below) return std::nullopt;
 
-  double arm = longest_arm;
+  double arm = plane.longest_arm;
   const Vector3d foot = center_of_mass_O + depth * below->normal;
   for (std::size_t i = 0; i < below->loop.size(); ++i) {
     const Vector3d& from = hull.vertices[below->loop[i]];

@@ -17,9 +17,9 @@ namespace {
 using geometry::TriangleMesh;
 
 constexpr int kSpheres = 1500;
-constexpr double kEdgeFidelity = 0.001;  // m
+constexpr double kEdgeFidelity = 0.001;  // m, of things of household size.
 constexpr int kSegments = 32;            // of round primitives
-// Where the cover is measured, and what it may lack between these places, m.
+// Where the cover is measured, and what it may lack between these places: m, of things of household size.
 constexpr int kSurfacePoints = 3000;
 constexpr double kBetweenPoints = 3e-4;
 
@@ -46,9 +46,9 @@ core::Result<std::vector<TriangleMesh>> solids_of(const belief::CollisionShape& 
 
 /// The largest spheres that touch a surface from inside, grown by `margin` so that together they cover it.
 core::Result<std::shared_ptr<const collision::SphereTree>> covering(const TriangleMesh& solid, ShapeStore& shapes,
-                                                                    double* margin) {
-  PRESCENE_TRY(const auto touching,
-               shapes.surface_spheres(std::make_shared<const TriangleMesh>(solid), {kSpheres, kEdgeFidelity}));
+                                                                    double length_scale, double* margin) {
+  PRESCENE_TRY(const auto touching, shapes.surface_spheres(std::make_shared<const TriangleMesh>(solid),
+                                                           {kSpheres, kEdgeFidelity * length_scale}));
   std::vector<collision::PackedSphere> spheres;
   std::vector<collision::SurfaceAnchor> anchors;
   for (const collision::SurfacePatch& patch : touching->patches) {
@@ -60,7 +60,7 @@ core::Result<std::shared_ptr<const collision::SphereTree>> covering(const Triang
     for (const collision::PackedSphere& sphere : spheres)
       uncovered =
           std::min(uncovered, (sphere.centre.cast<double>() - on.position).norm() - static_cast<double>(sphere.radius));
-    *margin = std::max(*margin, uncovered + kBetweenPoints);
+    *margin = std::max(*margin, uncovered + kBetweenPoints * length_scale);
   }
   for (collision::PackedSphere& sphere : spheres) sphere.radius += static_cast<float>(*margin);
   core::ThreadPool alone(1);
@@ -124,7 +124,7 @@ core::Result<std::vector<FlightBodies::Placed>> placed_shapes(const std::vector<
 
 }  // namespace
 
-core::Result<FlightBodies> FlightBodies::make(const belief::Scene& scene, ShapeStore& shapes) {
+core::Result<FlightBodies> FlightBodies::make(const belief::Scene& scene, ShapeStore& shapes, double length_scale) {
   FlightBodies bodies;
   for (const belief::SceneObject& object : scene.objects) {
     Object& made = bodies.objects_.emplace_back();
@@ -132,7 +132,7 @@ core::Result<FlightBodies> FlightBodies::make(const belief::Scene& scene, ShapeS
       auto solids = solids_of(shape, shapes);
       if (!solids) return solids.status().at(object.name);
       for (const TriangleMesh& solid : *solids) {
-        auto tree = covering(solid, shapes, &made.margin);
+        auto tree = covering(solid, shapes, length_scale, &made.margin);
         if (!tree) return tree.status().at(object.name);
         made.parts.push_back(*std::move(tree));
       }

@@ -11,8 +11,6 @@ using geometry::Vector3d;
 
 constexpr double kCellsPerRadius = 3.0;
 constexpr double kMostCells = 64.0;  // along an edge of the domain
-// m: bodies sink into each other by about this much, and round shapes are meshes here.
-constexpr double kSlack = 1e-3;
 
 /// Nearest point of a triangle to p [Ericson 2005, section 5.1.5].
 Vector3d nearest_on_triangle(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
@@ -38,9 +36,9 @@ Vector3d nearest_on_triangle(const Vector3d& p, const Vector3d& a, const Vector3
 }  // namespace
 
 SpillLevels::SpillLevels(const std::vector<geometry::TriangleMesh>& surfaces, const geometry::Box& domain,
-                         double ball_radius, const Region& region, bool region_beyond) {
+                         const SpillBall& ball, const Region& region, bool region_beyond) {
   const Vector3d extent = domain.sizes();
-  size_ = std::max(ball_radius / kCellsPerRadius, extent.maxCoeff() / kMostCells);
+  size_ = std::max(ball.radius / kCellsPerRadius, extent.maxCoeff() / kMostCells);
   origin_ = domain.min();
   std::size_t total = 1;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -49,7 +47,7 @@ SpillLevels::SpillLevels(const std::vector<geometry::TriangleMesh>& surfaces, co
   }
   closed_.assign(total, 0);
   // The whole cell is too near when its centre is nearer by half its diagonal.
-  const double distance = ball_radius - kSlack - 0.5 * std::sqrt(3.0) * size_;
+  const double distance = ball.radius - ball.slack - 0.5 * std::sqrt(3.0) * size_;
   if (distance > 0.0)
     for (const geometry::TriangleMesh& surface : surfaces) close_near(surface, distance);
   flood(region, region_beyond);

@@ -20,7 +20,7 @@ ConvexPolytope hull_of(const geometry::Primitive& shape) { return *make_polytope
 TEST(FaceTrap, ABoxTipsOverItsNearestEdge) {
   const ConvexPolytope box = hull_of(BoxShape{{0.10, 0.08, 0.06}});
   const Pose standing = Pose::from_translation({0.0, 0.0, 0.03});
-  const auto trap = trap_of(box, standing, Vector3d::Zero(), 0.0, 1.0, 0.0);
+  const auto trap = trap_of(box, standing, Vector3d::Zero(), {0.0, 1.0}, 0.0);
   ASSERT_TRUE(trap);
   EXPECT_NEAR(trap->barrier, std::hypot(0.03, 0.04), 1e-12);
   EXPECT_NEAR(trap->lowest, 0.03, 1e-12);
@@ -31,12 +31,12 @@ TEST(FaceTrap, ABoxTipsOverItsNearestEdge) {
   EXPECT_NEAR(trap->tilt(0.03 * std::cos(angle) + 0.04 * std::sin(angle)), angle, 1e-9);
 
   // The support ends 1 cm from below the centre; the centre is 2 cm off; the edges are round.
-  EXPECT_NEAR(trap_of(box, standing, Vector3d::Zero(), 0.0, 0.01, 0.0)->barrier, std::hypot(0.03, 0.01), 1e-12);
-  EXPECT_NEAR(trap_of(box, standing, {0.0, 0.02, 0.0}, 0.0, 1.0, 0.0)->barrier, std::hypot(0.03, 0.02), 1e-12);
-  EXPECT_NEAR(trap_of(box, standing, Vector3d::Zero(), 0.0, 1.0, 0.005)->barrier, std::hypot(0.025, 0.035) + 0.005,
+  EXPECT_NEAR(trap_of(box, standing, Vector3d::Zero(), {0.0, 0.01}, 0.0)->barrier, std::hypot(0.03, 0.01), 1e-12);
+  EXPECT_NEAR(trap_of(box, standing, {0.0, 0.02, 0.0}, {0.0, 1.0}, 0.0)->barrier, std::hypot(0.03, 0.02), 1e-12);
+  EXPECT_NEAR(trap_of(box, standing, Vector3d::Zero(), {0.0, 1.0}, 0.005)->barrier, std::hypot(0.025, 0.035) + 0.005,
               1e-12);
-  EXPECT_FALSE(trap_of(box, standing, Vector3d::Zero(), 0.0, -0.01, 0.0));
-  EXPECT_FALSE(trap_of(box, standing, Vector3d::Zero(), 0.01, 1.0, 0.0));  // it reaches below the plane
+  EXPECT_FALSE(trap_of(box, standing, Vector3d::Zero(), {0.0, -0.01}, 0.0));
+  EXPECT_FALSE(trap_of(box, standing, Vector3d::Zero(), {0.01, 1.0}, 0.0));  // it reaches below the plane
 }
 
 TEST(FaceTrap, TheFaceBelowChangesWhereTheCentrePassesTheEdge) {
@@ -44,7 +44,7 @@ TEST(FaceTrap, TheFaceBelowChangesWhereTheCentrePassesTheEdge) {
   const double over = std::atan2(0.04, 0.03);
   for (const double more : {-0.01, 0.01}) {
     const Pose tilted{geometry::exp_rotation({over + more, 0.0, 0.0}), {0.0, 0.0, 0.06}};
-    const auto trap = trap_of(box, tilted, Vector3d::Zero(), 0.0, 1.0, 0.0);
+    const auto trap = trap_of(box, tilted, Vector3d::Zero(), {0.0, 1.0}, 0.0);
     ASSERT_TRUE(trap);
     EXPECT_NEAR(trap->lowest, more < 0.0 ? 0.03 : 0.04, 1e-12);
   }
@@ -52,7 +52,7 @@ TEST(FaceTrap, TheFaceBelowChangesWhereTheCentrePassesTheEdge) {
 
 TEST(FaceTrap, WhatRollsHasHardlyABarrier) {
   const Pose lying{geometry::exp_rotation({1.5707963267948966, 0.0, 0.0}), {0.0, 0.0, 0.036}};
-  const auto trap = trap_of(hull_of(geometry::Cylinder{0.035, 0.24}), lying, Vector3d::Zero(), 0.0, 1.0, 0.0);
+  const auto trap = trap_of(hull_of(geometry::Cylinder{0.035, 0.24}), lying, Vector3d::Zero(), {0.0, 1.0}, 0.0);
   const double rise = trap ? trap->barrier - trap->lowest : 0.0;
   EXPECT_LT(rise, 5e-4);
 }
@@ -90,7 +90,7 @@ SpillLevels leaving(const std::vector<TriangleMesh>& surfaces, double radius) {
     return (high.array() > Eigen::Array3d(0.09, 0.09, 0.25)).any() ||
            (low.array() < Eigen::Array3d(-0.09, -0.09, 0.01)).any();
   };
-  return {surfaces, Box(Vector3d(-0.16, -0.16, -0.06), Vector3d(0.16, 0.16, 0.32)), radius, outside, true};
+  return {surfaces, Box(Vector3d(-0.16, -0.16, -0.06), Vector3d(0.16, 0.16, 0.32)), {radius}, outside, true};
 }
 
 TEST(SpillLevels, ABinSpillsOverItsRim) {
@@ -114,7 +114,7 @@ TEST(SpillLevels, GettingInTakesTheBallOverTheRim) {
            high.z() > 0.03;
   };
   const double radius = 0.035;
-  const SpillLevels levels({bin}, Box(Vector3d(-0.16, -0.16, -0.06), Vector3d(0.16, 0.16, 0.32)), radius, inside,
+  const SpillLevels levels({bin}, Box(Vector3d(-0.16, -0.16, -0.06), Vector3d(0.16, 0.16, 0.32)), {radius}, inside,
                            false);
   for (const Vector3d& p : {Vector3d(0.14, 0.0, 0.05), Vector3d(0.0, -0.15, 0.20), Vector3d(2.0, 1.0, 0.0)}) {
     EXPECT_GT(levels.level(p), 0.25);

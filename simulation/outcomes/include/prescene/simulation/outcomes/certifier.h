@@ -27,6 +27,9 @@ struct CertifierOptions {
   ShapeStore* shapes = nullptr;
   /// MechanicsOptions::edge_rounding of the simulator that runs the instances, m.
   double edge_rounding = MechanicsOptions{}.edge_rounding;
+  /// Simulator::length_scale() of that simulator: rooms for its errors, and the rounding of edges, are as many times
+  /// larger.
+  double length_scale = 1.0;
   /// Off only to see that the audit catches it: supports are taken to be without edges.
   bool shorten_arms = true;
   /// Looked at between the conditions, each of which takes some milliseconds; may be null.

@@ -22,8 +22,9 @@ struct BearingBody {
 };
 
 /// `hull` is that of all `shapes`, in O. The polytope is the hull with its faces moved inwards, as little as will do.
-/// Nothing when that is more than a millimetre, or the spheres can't be made.
+/// Nothing when that is more than a millimetre (times `length_scale`, which is Simulator::length_scale()), or the
+/// spheres can't be made.
 std::optional<BearingBody> bearing_body(const std::vector<belief::CollisionShape>& shapes, const ConvexPolytope& hull,
-                                        const Vector3d& center_of_mass_O, ShapeStore& store);
+                                        const Vector3d& center_of_mass_O, ShapeStore& store, double length_scale = 1.0);
 
 }  // namespace prescene::simulation

@@ -32,8 +32,9 @@ namespace prescene::simulation {
 /// A scene's bodies as uncertain queries want them: objects are spheres, everything else is what it is.
 class FlightBodies {
  public:
-  /// Fails as the shape store does.
-  static core::Result<FlightBodies> make(const belief::Scene& scene, ShapeStore& shapes);
+  /// `length_scale` is Simulator::length_scale() of the simulator that runs the scene's instances: the spheres follow
+  /// the surface as closely for things of any size. Fails as the shape store does.
+  static core::Result<FlightBodies> make(const belief::Scene& scene, ShapeStore& shapes, double length_scale = 1.0);
 
   struct Object {
     /// Closed parts, in O; they may overlap.
@@ -78,10 +79,15 @@ struct CommonFlight {
   std::vector<FlightOpening> openings;
 };
 
+/// The values are for things of household size.
 struct CommonFlightOptions {
   int draws = 128;               ///< Flights a component that the moments are of, >= 32.
   double interval = 1.0 / 60.0;  ///< Between two looks, s, > 0. A look is at all times since the one before.
   double longest = 10.0;         ///< s, > 0: flights that last longer are not followed.
+  double far_away = 1e3;         ///< m: nothing leaves the world of flights within `longest`.
+
+  /// For the scenes of a simulator with this Simulator::length_scale().
+  static CommonFlightOptions of(double length_scale);
 };
 
 /// Each object flies by itself in `make_simulator`'s empty world, with the request's actions, and the moments of its

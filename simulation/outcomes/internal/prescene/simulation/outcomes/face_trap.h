@@ -49,10 +49,16 @@ struct Trap {
   double tilt(double height) const;
 };
 
-/// `hull` is that of the whole body in O, or lies inside of it; `edge_radius` rounds its edges (m); `longest_arm` (m)
-/// is how far from below the centre of mass the support is sure to reach. Nothing when the body is not above the plane
-/// at `plane_height`.
+/// The level plane that a body is above.
+struct TrapPlane {
+  double height = 0.0;       ///< z in W, m.
+  double longest_arm = 0.0;  ///< How far from below the centre of mass it is sure to reach, m.
+  double sunk = 2e-3;        ///< How deep what is above it may have sunk into it, m.
+};
+
+/// `hull` is that of the whole body in O, or lies inside of it; `edge_radius` rounds its edges (m). Nothing when the
+/// body is not above the plane.
 std::optional<Trap> trap_of(const ConvexPolytope& hull, const Pose& X_WO, const Vector3d& center_of_mass_O,
-                            double plane_height, double longest_arm, double edge_radius);
+                            const TrapPlane& plane, double edge_radius);
 
 }  // namespace prescene::simulation

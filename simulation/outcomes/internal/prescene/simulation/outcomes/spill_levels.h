@@ -17,6 +17,13 @@
 
 namespace prescene::simulation {
 
+/// A ball about the centre of mass that a body holds.
+struct SpillBall {
+  double radius = 0.0;  ///< m
+  /// m that surfaces may come into it all the same: bodies sink into each other, and round shapes are meshes here.
+  double slack = 1e-3;
+};
+
 class SpillLevels {
  public:
   using Vector3d = geometry::Vector3d;
@@ -25,7 +32,7 @@ class SpillLevels {
 
   /// `surfaces` in W. The grid covers `domain` (m); what is beyond it is one open place without floor, of the region if
   /// `region_beyond`.
-  SpillLevels(const std::vector<geometry::TriangleMesh>& surfaces, const geometry::Box& domain, double ball_radius,
+  SpillLevels(const std::vector<geometry::TriangleMesh>& surfaces, const geometry::Box& domain, const SpillBall& ball,
               const Region& region, bool region_beyond);
   /// The same places for the ball, another region: most of the work is finding the places.
   SpillLevels(const SpillLevels& same_places, const Region& region, bool region_beyond);
