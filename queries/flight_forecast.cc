@@ -13,7 +13,7 @@ core::Status forecast_flight(const Foresight& foresight, const Prior& prior, con
   if (!scene.joints.empty()) return core::unsupported("flights of things on joints are not followed");
   const double length_scale = foresight.simulator->length_scale();
   const auto bodies = simulation::FlightBodies::make(scene, *context.shapes, length_scale);
-  if (!bodies) return core::ok_status();
+  if (!bodies) return bodies.status();
   const auto flight =
       simulation::common_flight(scene, *bodies, prior.starts, foresight.request, context.make_simulator, prior.stream,
                                 *context.pool, simulation::CommonFlightOptions::of(length_scale), context.cancellation);

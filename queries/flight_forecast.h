@@ -7,8 +7,8 @@
 
 namespace prescene::queries {
 
-/// For how long nothing can touch anything, into `flight`. Nothing is set when stopped, without a shape store, or
-/// where a shape can't be made of spheres. Fails when the objects can't be simulated each by itself.
+/// For how long nothing can touch anything, into `flight`. Nothing is set when stopped or without a shape store. Fails
+/// where a shape can't be made of spheres, and when the objects can't be simulated each by itself.
 core::Status forecast_flight(const Foresight& foresight, const Prior& prior, const QueryContext& context,
                              belief::PredictAnswer& answer);
 
