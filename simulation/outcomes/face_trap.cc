@@ -6,16 +6,12 @@
 #include <limits>
 #include <numbers>
 
+#include "prescene/geometry/polygon.h"
+
 namespace prescene::simulation {
+
 double distance_inside(const LevelFace& face, const Eigen::Vector2d& point) {
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < face.polygon.size(); ++i) {
-    const Eigen::Vector2d& from = face.polygon[i];
-    const Eigen::Vector2d side = face.polygon[(i + 1) % face.polygon.size()] - from;
-    const Eigen::Vector2d to = point - from;
-    least = std::min(least, (side.x() * to.y() - side.y() * to.x()) / side.norm());
-  }
-  return least;
+  return geometry::distance_inside(face.polygon, point);
 }
 
 std::vector<ConvexPolytope> shape_hulls(const std::vector<belief::CollisionShape>& shapes) {

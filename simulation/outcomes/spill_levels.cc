@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "prescene/geometry/triangle_distance.h"
+
 namespace prescene::simulation {
 namespace {
 
@@ -11,27 +13,6 @@ using geometry::Vector3d;
 
 constexpr double kCellsPerRadius = 3.0;
 constexpr double kMostCells = 64.0;  // along an edge of the domain
-
-/// Nearest point of a triangle to p [Ericson 2005, section 5.1.5].
-Vector3d nearest_on_triangle(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  const Vector3d ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0.0 && d2 <= 0.0) return a;
-  const Vector3d bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0.0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return a + d1 / (d1 - d3) * ab;
-  const Vector3d cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0.0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0) return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
-  const double scale = 1.0 / (va + vb + vc);
-  return a + vb * scale * ab + vc * scale * ac;
-}
 
 }  // namespace
 
@@ -77,7 +58,7 @@ void SpillLevels::close_near(const geometry::TriangleMesh& surface, double dista
           std::uint8_t& closed = closed_[cell(i, j, k)];
           if (closed) continue;
           const Vector3d center = low_of(i, j, k).array() + 0.5 * size_;
-          closed = (nearest_on_triangle(center, a, b, c) - center).squaredNorm() < distance * distance;
+          closed = geometry::squared_distance_to_triangle(center, a, b, c) < distance * distance;
         }
   }
 }
