@@ -148,6 +148,36 @@ class Looks {
   int looks_ = 0;  // but for the first of kEarly
 };
 
+bool nothing_is_random(const StartDistribution& starts, const RunRequest& request) {
+  return action_dimensions(request.actions) == 0 &&
+         std::all_of(starts.components.begin(), starts.components.end(),
+                     [](const StartComponent& component) { return component.dimensions == 0; });
+}
+
+/// What the audit found until now, into the estimate; where certificates fail, all instances run to rest instead, and
+/// none is certified any more. False when that was cancelled.
+bool audit(double tolerated_mismatch, InstanceRunner& runner, AuditTrail& trail, OutcomeEstimate& estimate) {
+  bool switched_off = estimate.certificates.switched_off;
+  bool cancelled = false;
+  if (runner.certifier && trail.fails(estimate.instances.size(), tolerated_mismatch)) {
+    switched_off = repair_certified(runner, trail, tolerated_mismatch, estimate.instances, cancelled);
+    runner.certifier = nullptr;
+  }
+  estimate.certificates = trail.use_of(estimate.instances.size());
+  estimate.certificates.switched_off = switched_off;
+  return !cancelled;
+}
+
+/// The stop rule: why a net of `target` instances, all of which were run and evaluated, does not grow any more.
+std::optional<EstimateStop> end_of_net(const OutcomeEstimate& estimate, const EstimatorOptions& options,
+                                       std::size_t target, std::size_t limit) {
+  if (estimate.certain) return EstimateStop::kConverged;
+  if (options.exact_instances) return target == limit ? std::optional(EstimateStop::kExact) : std::nullopt;
+  if (estimate.converged && target >= static_cast<std::size_t>(std::max(0, options.min_instances)))
+    return EstimateStop::kConverged;
+  return target == limit ? std::optional(EstimateStop::kMaxInstances) : std::nullopt;
+}
+
 }  // namespace
 
 std::string to_string(EstimateStop stop) {
@@ -202,10 +232,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
                         options.certifier,
                         options.audit_share,
                         options.keep_contacts};
-  estimate.certain = action_dimensions(request.actions) == 0 &&
-                     std::all_of(starts.components.begin(), starts.components.end(),
-                                 [](const StartComponent& component) { return component.dimensions == 0; }) &&
-                     starts.components.size() <= limit;
+  estimate.certain = nothing_is_random(starts, request) && starts.components.size() <= limit;
   EstimateForecast forecast(options, progress);
   Looks looks(starts, variables, options);
   const std::size_t most_at_once = largest_chunk(starts, samplers, request, options.bytes_of_runs);
@@ -237,15 +264,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
         looks.tell(estimate, watch.seconds());
       }
     }
-    bool switched_off = estimate.certificates.switched_off;
-    if (runner.certifier && trail.fails(estimate.instances.size(), options.tolerated_mismatch)) {
-      bool cancelled = false;
-      switched_off = repair_certified(runner, trail, options.tolerated_mismatch, estimate.instances, cancelled);
-      if (cancelled) stop = EstimateStop::kCancelled;
-      runner.certifier = nullptr;
-    }
-    estimate.certificates = trail.use_of(estimate.instances.size());
-    estimate.certificates.switched_off = switched_off;
+    if (!audit(options.tolerated_mismatch, runner, trail, estimate)) stop = EstimateStop::kCancelled;
     weigh(starts, estimate);
     estimate.variables.clear();
     estimate.converged = false;
@@ -258,16 +277,7 @@ OutcomeEstimate estimate_outcomes(const Simulator& simulator, const StartDistrib
     // Whoever gave a time may also cancel when it is over.
     if (stop == EstimateStop::kCancelled && options.max_seconds && watch.seconds() >= *options.max_seconds)
       stop = EstimateStop::kTimeLimit;
-    if (stop) break;
-    if (estimate.certain) {
-      stop = EstimateStop::kConverged;
-    } else if (options.exact_instances) {
-      if (target == limit) stop = EstimateStop::kExact;
-    } else if (estimate.converged && target >= static_cast<std::size_t>(std::max(0, options.min_instances))) {
-      stop = EstimateStop::kConverged;
-    } else if (target == limit) {
-      stop = EstimateStop::kMaxInstances;
-    }
+    if (!stop) stop = end_of_net(estimate, options, target, limit);
   }
   estimate.stop = *stop;
   estimate.wall_seconds = watch.seconds();

@@ -5,7 +5,7 @@
 // grown in steps (64, 96, 128, 192, 256, 384, ...) until every interval is narrow enough. Aligned consecutive blocks of
 // the net serve as pseudo-replicates, so that the whole net's accuracy is kept and still has an error estimate.
 //
-// The stop rule, looked at after each step of the net (the end of the loop in estimate_outcomes, outcome_estimator.cc):
+// The stop rule, looked at after each step of the net (end_of_net in outcome_estimator.cc):
 // - converged: every half width is at most `tolerance`, and at least `min_instances` were run;
 // - or `max_instances` were run;
 // - with `exact_instances`: just that many were run, whatever the intervals say;
