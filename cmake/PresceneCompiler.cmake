@@ -102,15 +102,25 @@ function(prescene_unity_except_simd)
   endforeach()
 endfunction()
 
-# The headers that most sources include are parsed once for all libraries and once, with GoogleTest's, for all tests. The
-# preset dev, which compiles each source alone, has none of it and shows that each source includes what it uses.
+# Sources that only check something are optimised less than libraries in a release build: they cost half of what a build
+# costs, while most of a test's time is spent in libraries. The linker takes a function of a header that was not inlined
+# from the test's object, even where a library calls it. Its bits are the same, since no option of ours reorders arithmetic,
+# but not its speed: tests with long loops of their own, or that include headers of kernels, are OPTIMISED (prescene_tests).
+set(PRESCENE_TEST_OPTIONS "$<$<CONFIG:Release>:-Og>")
+
+# The headers that most sources include are parsed once for each set of targets: `libraries`; with GoogleTest's, `tests` and
+# `optimised_tests`; and `checks`, other programs of the tests. The preset dev, which compiles each source alone, has none of
+# it and shows that each source includes what it uses.
 # g++ gives a source the optimisation of the precompiled headers, whatever the source's own options say: sources with such
 # options (prescene_kernel_sources) do without.
 option(PRESCENE_PRECOMPILED "Parse common headers once, where several sources are compiled as one by g++" ON)
 
-# prescene_precompile(<target> <set> <library>...): `target` reads the precompiled headers of the set `libraries` or `tests`,
-# which see the outside libraries that are named.
+# prescene_precompile(<target> <set> <library>...): `target` is optimised as its set is, and reads the set's precompiled
+# headers, which see the outside libraries that are named.
 function(prescene_precompile target set)
+  if(set MATCHES "^(tests|checks)$")
+    target_compile_options(${target} PRIVATE ${PRESCENE_TEST_OPTIONS})
+  endif()
   if(NOT PRESCENE_PRECOMPILED OR NOT PRESCENE_UNITY OR NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     return()
   endif()

@@ -18,11 +18,12 @@ set(PRESCENE_FUZZERS OFF CACHE BOOL "Build fuzz targets as libFuzzer programs (c
 add_custom_target(prescene_fuzzers)
 
 # prescene_tests(<name> SOURCES <cc>... USES <module>... PRIVATE_LINKS <target>...
+#   OPTIMISED                 compiled like a library (PresceneCompiler.cmake)
 #   TIMEOUT <seconds>         of each case, default 300
 #   RESOURCE_LOCK <names>)    cases that share one of these names never run at the same time
 # makes the executable <name>_tests, if this build has what it uses (PresceneParts.cmake).
 function(prescene_tests name)
-  cmake_parse_arguments(PARSE_ARGV 1 T "" "TIMEOUT" "SOURCES;USES;PRIVATE_LINKS;RESOURCE_LOCK")
+  cmake_parse_arguments(PARSE_ARGV 1 T "OPTIMISED" "TIMEOUT" "SOURCES;USES;PRIVATE_LINKS;RESOURCE_LOCK")
   if(T_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "prescene_tests(${name}): unknown arguments ${T_UNPARSED_ARGUMENTS}")
   endif()
@@ -40,7 +41,11 @@ function(prescene_tests name)
   target_link_libraries(${target} PRIVATE ${T_USES} ${T_PRIVATE_LINKS} GTest::gmock GTest::gtest_main)
   prescene_unity(${target})
   set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 12)  # tests have many names of their own
-  prescene_precompile(${target} tests Eigen3::Eigen tl::expected GTest::gmock)
+  if(T_OPTIMISED)
+    prescene_precompile(${target} optimised_tests Eigen3::Eigen tl::expected GTest::gmock)
+  else()
+    prescene_precompile(${target} tests Eigen3::Eigen tl::expected GTest::gmock)
+  endif()
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
 
   # Discovery runs when CTest starts, so that building needs to run nothing.
@@ -90,7 +95,7 @@ function(prescene_fuzz_target name)
   add_executable(fuzz_${name} ${F_SOURCES})
   target_link_libraries(fuzz_${name} PRIVATE ${F_USES} ${F_PRIVATE_LINKS})
   set_target_properties(fuzz_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/fuzz")
-  prescene_precompile(fuzz_${name} libraries Eigen3::Eigen tl::expected)
+  prescene_precompile(fuzz_${name} checks Eigen3::Eigen tl::expected)
   add_dependencies(prescene_fuzzers fuzz_${name})
   if(PRESCENE_FUZZERS)
     target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
