@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <cmath>
 
 #include "prescene/geometry/dense_solvers.h"
@@ -59,6 +60,8 @@ Matrix6d Cholesky6::inverse() const {
 Vector3d solve_symmetric_3(const Matrix3d& A, const Vector3d& b) { return A.ldlt().solve(b); }
 
 Vector6d solve_symmetric_6(const Matrix6d& A, const Vector6d& b) { return A.ldlt().solve(b); }
+
+Matrix6d inverse_6(const Matrix6d& A) { return A.inverse(); }
 
 Quaterniond rotation_between(const Vector3d& from, const Vector3d& to) {
   constexpr double kOpposite = 1e-12;

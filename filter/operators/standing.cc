@@ -7,6 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "prescene/geometry/dense_solvers.h"
+
 namespace prescene::filter {
 namespace {
 
@@ -184,7 +186,7 @@ std::optional<PoseEquations> standing_equations(
   geometry::Matrix6d frame = seen.information;
   frame.diagonal().head<3>().array() += 1.0 / (kOpenTurn * kOpenTurn);
   frame.diagonal().tail<3>().array() += 1.0 / (kOpenPlace * kOpenPlace);
-  const geometry::Matrix6d frame_covariance = frame.inverse();
+  const geometry::Matrix6d frame_covariance = geometry::inverse_6(frame);
   const Vector3d seen_off = off + J * (frame_covariance * seen.gradient);
   const Matrix3d seen_to = J * frame_covariance * J.transpose();
   const auto likelihood = [&](const Eigen::Matrix2d& tilt_variance, double height_variance) {

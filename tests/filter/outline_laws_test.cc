@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -158,7 +157,7 @@ TEST(FacetLever, IsThatOfTheFlatsOfARoundThing) {
 
 /// What is known of a turn about z while everything else may follow it.
 double information_of_turn(const Matrix6d& H) {
-  const Matrix6d covariance = (H + 1e-9 * H.trace() * Matrix6d::Identity()).inverse();
+  const Matrix6d covariance = geometry::inverse_6(H + 1e-9 * H.trace() * Matrix6d::Identity());
   return 1.0 / covariance(2, 2);
 }
 

@@ -2,13 +2,13 @@
 // How a thing stands on what carries it, against sampled contacts and what is simulated.
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <numbers>
 
 #include "filter_fixture.h"
 #include "prescene/filter/operators/standing.h"
 #include "prescene/geometry/angles.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::filter_tests {
 namespace {
@@ -72,7 +72,7 @@ TEST_F(StandingOnATable, ABoxIsBroughtFlushWhicheverFaceItIsOn) {
       ASSERT_TRUE(stands) << axis << ' ' << way;
       Matrix6d ridged = stands->information;
       ridged.diagonal().array() += 1.0;  // of what it says nothing of
-      const Vector6d step = ridged.inverse() * stands->gradient;
+      const Vector6d step = geometry::inverse_6(ridged) * stands->gradient;
       const Pose stood = geometry::box_plus(X_WO, step);
       const Vector3d up_O = down.conjugate() * Vector3d::UnitZ();
       EXPECT_NEAR((stood.rotation * up_O).z(), 1.0, 1e-5) << axis << ' ' << way;

@@ -69,5 +69,15 @@ TEST(SolveSymmetric, SolvesSystemsOfThreeAndSixRows) {
   }
 }
 
+TEST(Inverse6, TimesTheMatrixIsTheIdentity) {
+  core::RandomStream stream(5, core::Purpose::kTest);
+  for (int i = 0; i < 100; ++i) {
+    Matrix6d A;
+    for (double& x : A.reshaped()) x = stream.normal();
+    const Matrix6d inverse = inverse_6(A);
+    EXPECT_NEAR((A * inverse - Matrix6d::Identity()).norm(), 0.0, 1e-13 * A.norm() * inverse.norm());
+  }
+}
+
 }  // namespace
 }  // namespace prescene::geometry

@@ -3,12 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
 #include "prescene/core/random.h"
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::queries {
 namespace {
@@ -69,8 +70,9 @@ TEST(PathError, HasTheLikelihoodOfTheJointDistributionOfAllFrames) {
     for (int i = 0; i < kFrames; ++i)
       for (int j = 0; j < kFrames; ++j) joint(i, j) = lever * lever * reached[std::min(i, j)] + (i == j ? noise : 0.0);
     const double axes = lever == 1.0 ? 2.0 : 1.0;
-    expected += axes * 0.5 * (kFrames * std::log(noise) - std::log(joint.determinant()));
-    if (lever == 1.0) expected -= 0.5 * off.dot(joint.ldlt().solve(off));
+    const Eigen::MatrixXd root = geometry::cholesky_factor(joint);
+    expected += axes * (0.5 * kFrames * std::log(noise) - root.diagonal().array().log().sum());
+    if (lever == 1.0) expected -= 0.5 * geometry::solve_lower(root, off).squaredNorm();
   }
   EXPECT_NEAR(sum, expected, 1e-6 * std::abs(expected));
 }

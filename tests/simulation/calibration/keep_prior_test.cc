@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <cmath>
+
+#include "prescene/geometry/dense_solvers.h"
 
 namespace prescene::tests {
 namespace {
@@ -47,7 +49,7 @@ TEST(KeepPrior, OthersMoveAsIfItHadBeenKnown) {
   const VectorXd deviation = vector(10.0, 1.0, 10.0);
   const MatrixXd precision = deviation.cwiseAbs2().cwiseInverse().asDiagonal();
   Eigen::Vector4d y(1.0, 2.0, 2.5, -1.2);
-  MatrixXd covariance = (A.transpose() * A + precision).inverse();
+  MatrixXd covariance = geometry::inverse(A.transpose() * A + precision);
   VectorXd value = covariance * A.transpose() * y;
   ASSERT_GT(std::sqrt(covariance(1, 1)), 0.9);
   const double error = std::sqrt(covariance(0, 0));
@@ -56,7 +58,7 @@ TEST(KeepPrior, OthersMoveAsIfItHadBeenKnown) {
   MatrixXd rest(4, 2);
   rest << A.col(0), A.col(2);
   const MatrixXd known = rest.transpose() * rest + 0.01 * MatrixXd::Identity(2, 2);
-  const Eigen::Vector2d expected = known.inverse() * rest.transpose() * y;
+  const Eigen::Vector2d expected = geometry::inverse(known) * rest.transpose() * y;
   EXPECT_NEAR(value[0], expected[0], 1e-12);
   EXPECT_NEAR(value[2], expected[1], 1e-12);
   // Their errors still have its uncertainty in them.

@@ -76,6 +76,8 @@ class Cholesky6 {
 /// x with A x = b for a symmetric, positive or negative semidefinite A of three or six rows (LDLT).
 Vector3d solve_symmetric_3(const Matrix3d& A, const Vector3d& b);
 Vector6d solve_symmetric_6(const Matrix6d& A, const Vector6d& b);
+/// A^-1 of an invertible A of six rows (PartialPivLU).
+Matrix6d inverse_6(const Matrix6d& A);
 
 /// The smallest rotation that takes the direction of `from` to that of `to`, both not zero; of opposite directions one
 /// of the half turns (as Quaterniond::FromTwoVectors, without its singular value decomposition).
