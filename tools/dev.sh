@@ -18,7 +18,7 @@ usage: ./dev VERB
   demo                         record, replay and ask about a carton carried over a bin; report in build/demo/
   bench [NAME [OPTION]...]     run the benchmark NAME (default: all); results in build/bench/NAME.json
   lint [FILE | --recent K/N]   format, layer and clang-tidy checks; --recent: clang-tidy on what is new since origin/main (or
-                               a day) and on the K-th of N parts of the rest
+                               six hours) and on the K-th of N parts of the rest
   format [FILE]...             format the sources in place
   faults [FAULT] [SECONDS]     do to a running service what may happen to it, and print what came of it: all, or one of kill, power,
                                disk, rights, descriptors, memory, clock, publishers, second, reader, supervisor, flood, soak;
