@@ -13,12 +13,13 @@ using belief::EventKind;
 using Clock = core::Cancellation::Clock;
 
 constexpr int kFirstRuns = 1;
-constexpr int kLaterFirstPoints = 2;  // times the points of a run, that are drawn where the runs before found it
-constexpr int kMostRounds = 2;        // times the query's runs: of what stays uncertain
-constexpr double kHopeless = 25.0;    // nats: what is so far behind the best is not searched further
-constexpr double kMayMatter = 0.01;   // probability from which on an event that was not searched is named
-constexpr double kMoreToTell = 1.5;   // times the instances: a look draws from all evidences, which takes its time
-constexpr int kFreshRuns = 1000;      // numbers of runs from here on are for what must not have been seen
+constexpr int kLaterFirstPoints = 2;    // times the points of a run, that are drawn where the runs before found it
+constexpr int kMostRounds = 2;          // times the query's runs: of what stays uncertain
+constexpr double kHopeless = 25.0;      // nats: what is so far behind the best is not searched further
+constexpr double kMayMatter = 0.01;     // probability from which on an event that was not searched is named
+constexpr double kMoreToTell = 1.5;     // times the instances: a look draws from all evidences, which takes its time
+constexpr double kLeastPrior = 1e-300;  // of what can't be, whose evidence does not matter
+constexpr int kFreshRuns = 1000;        // numbers of runs from here on are for what must not have been seen
 constexpr double kLikelierThanSeen =
     3.0;  // nats: by which frames may be likelier than the best of some dozens of poses
 
@@ -30,6 +31,11 @@ int round_of(const Hypothesis& hypothesis) {
   if (kind == EventKind::kNothing) return hypothesis.begins_otherwise ? 1 : -1;
   if (kind == EventKind::kOther) return 0;
   return kind == EventKind::kPushed || kind == EventKind::kBumped || kind == EventKind::kSlipped ? 2 : 1;
+}
+
+/// Nothing, from where the belief begins: what others are compared with.
+bool others_refer_to(const Judged& judged) {
+  return judged.hypothesis.kind == EventKind::kNothing && !judged.hypothesis.begins_otherwise;
 }
 
 int runs_of(const Judged& judged) { return static_cast<int>(judged.posterior.log_evidence.size()); }
@@ -106,44 +112,66 @@ std::vector<std::string> EventSearch::remarks() const {
 /// Tells what is known before all hypotheses were searched once, if that is much more than when it was told last.
 void EventSearch::tell(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses,
                        const Look& look) {
-  if (!look || out_of_time_ || evaluated_ < kMoreToTell * told_at_) return;
-  told_at_ = evaluated_;
+  if (!look || out_of_time_ || best_ == kNoneYet || evaluated_ < kMoreToTell * told_at_) return;
   std::vector<Judged> nothings = nothings_, judged = judged_;
-  for (std::size_t c = 0; c < candidates.size(); ++c)
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    // What others are compared with, or 0 where its evidence is known and counted already.
+    double open_reference = 0.0;
+    if (c >= nothings_.size()) {
+      leave_open(nothings.emplace_back(nothing_about(candidates, c, hypotheses)));
+      open_reference = nothings.back().log_bayes;
+    }
     for (std::size_t i = 0; i < hypotheses.size(); ++i) {
       if (hypotheses[i].object != candidates[c] || round_of(hypotheses[i]) < 0) continue;
       const Judged open = judged_of(hypotheses[i], c, i, hypotheses.size());
       if (std::any_of(judged_.begin(), judged_.end(), [&](const Judged& known) { return known.number == open.number; }))
         continue;
-      leave_open(judged.emplace_back(open));
+      Judged& added = judged.emplace_back(open);
+      if (added.hypothesis.kind == EventKind::kOther)
+        search(added, kFirstRuns, {});
+      else
+        leave_open(added);
+      added.log_bayes -= open_reference;
     }
+  }
   if (judged.empty()) return;
+  told_at_ = evaluated_;
   weigh_events(nothings, judged, query_.confidence, query_.seed);
   look(std::move(nothings), std::move(judged));
+}
+
+/// That nothing happened to a candidate, of which nothing was found yet.
+Judged EventSearch::nothing_about(const std::vector<std::size_t>& candidates, std::size_t candidate,
+                                  const std::vector<Hypothesis>& hypotheses) {
+  Judged nothing;
+  nothing.hypothesis = {EventKind::kNothing, candidates[candidate], {}, 0.0};
+  for (const Hypothesis& h : hypotheses)
+    if (h.kind == EventKind::kNothing && !h.begins_otherwise) nothing.hypothesis.prior = h.prior;
+  nothing.object = candidates[candidate];
+  nothing.number = candidate * (hypotheses.size() + 1);
+  return nothing;
 }
 
 /// Each hypothesis once; those that can't compete end early, and those that there is no time for are left open.
 core::Status EventSearch::search_all(const std::vector<std::size_t>& candidates,
                                      const std::vector<Hypothesis>& hypotheses, const Look& look) {
-  double prior_of_nothing = 0.0;
   std::size_t simulated = events_.is_still() ? 0 : candidates.size();
-  for (const Hypothesis& h : hypotheses) {
-    if (h.kind == EventKind::kNothing && !h.begins_otherwise) prior_of_nothing = h.prior;
+  for (const Hypothesis& h : hypotheses)
     if (round_of(h) == kRounds - 1) ++simulated;
-  }
   others_.resize(events_.objects().size());
-  for (std::size_t c = 0; c < candidates.size(); ++c) {
-    const std::size_t object = candidates[c];
+  for (const std::size_t object : candidates)
     others_[object] = other_motion(events_, likelihood_, object, query_.priors);
-    Judged& nothing = nothings_.emplace_back();
-    nothing.hypothesis = {EventKind::kNothing, object, {}, prior_of_nothing};
-    nothing.object = object;
-    nothing.number = c * (hypotheses.size() + 1);
-    if (cancelled()) return stopped_searching();
-    search(nothing, query_.runs, share_of_time(simulated));
-    if (!events_.is_still()) --simulated;
-  }
+  // How likely the frames can get is known before anything is simulated.
+  for (const Hypothesis& h : hypotheses)
+    if (h.kind == EventKind::kOther) best_ = std::max(best_, std::log(h.prior) + others_[h.object].log_evidence);
   tell(candidates, hypotheses, look);
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    if (cancelled()) return stopped_searching();
+    Judged& nothing = nothings_.emplace_back(nothing_about(candidates, c, hypotheses));
+    search(nothing, kFirstRuns, share_of_time(simulated));
+    if (!events_.is_still()) --simulated;
+    tell(candidates, hypotheses, look);
+  }
   for (int round = 0; round < kRounds; ++round)
     for (std::size_t c = 0; c < candidates.size(); ++c)
       for (std::size_t i = 0; i < hypotheses.size(); ++i) {
@@ -165,17 +193,33 @@ core::Status EventSearch::search_rivals() {
   const bool unexplained = std::any_of(judged_.begin(), judged_.end(), [&](const Judged& judged) {
     return judged.hypothesis.kind == EventKind::kOther && log_posterior(judged) >= best_ - 1e-9;
   });
-  for (int runs = kFirstRuns; runs < query_.runs; ++runs)
-    for (Judged& judged : judged_) {
-      const bool hopeless =
-          judged.posterior.gave_up || log_posterior(judged) + judged.may_be_more.value_or(0.0) <= best_ - kHopeless;
-      if (judged.hypothesis.kind == EventKind::kOther || (hopeless && !unexplained)) continue;
-      if (cancelled()) return stopped_searching();
-      if (out_of_time()) return core::ok_status();
-      search(judged, 1, [this] { return out_of_time(); });
-      if (unexplained) judged.posterior.gave_up = false;  // the run that did counts as one without evidence
-    }
+  // Without a rival its probability is known, and runs are for its parameters.
+  const int runs_alone = std::max(2, query_.runs / 2);
+  for (int runs = kFirstRuns; runs < query_.runs; ++runs) {
+    if (!unexplained && runs >= runs_alone && rivals() < 2) return core::ok_status();
+    for (std::vector<Judged>* some : {&nothings_, &judged_})
+      for (Judged& judged : *some) {
+        if (judged.hypothesis.kind == EventKind::kOther || runs_of(judged) > runs) continue;
+        if (is_hopeless(judged) && !unexplained) continue;
+        if (cancelled()) return stopped_searching();
+        if (out_of_time()) return core::ok_status();
+        search(judged, 1, [this] { return out_of_time(); });
+        if (unexplained) judged.posterior.gave_up = false;  // the run that did counts as one without evidence
+      }
+  }
   return core::ok_status();
+}
+
+/// Whether more runs of it can change no probability.
+bool EventSearch::is_hopeless(const Judged& judged) const {
+  return judged.posterior.gave_up || log_posterior(judged) + judged.may_be_more.value_or(0.0) <= best_ - kHopeless;
+}
+
+/// Explanations that compete, with nothing as one.
+std::ptrdiff_t EventSearch::rivals() const {
+  const auto competes = [this](const Judged& judged) { return !is_hopeless(judged); };
+  return std::count_if(judged_.begin(), judged_.end(), competes) +
+         (std::any_of(nothings_.begin(), nothings_.end(), competes) ? 1 : 0);
 }
 
 /// More runs of those whose intervals are wide, as long as there is time.
@@ -258,8 +302,13 @@ void EventSearch::propose_from_other_touch(const Hypothesis& hypothesis, Tempere
 
 /// Against `nothing` about its object; of that itself, as it is.
 void EventSearch::note_evidence(Judged& judged, double log_evidence) {
-  const bool is_reference = judged.hypothesis.kind == EventKind::kNothing && !judged.hypothesis.begins_otherwise;
-  judged.log_bayes = log_evidence - (is_reference ? 0.0 : evidence_of_nothing(judged.object));
+  if (others_refer_to(judged)) {
+    for (Judged& other : judged_)
+      if (other.object == judged.object) other.log_bayes += judged.log_bayes - log_evidence;
+    judged.log_bayes = log_evidence;
+  } else {
+    judged.log_bayes = log_evidence - evidence_of_nothing(judged.object);
+  }
   judged.may_be_more.reset();
   if (judged.posterior.unfinished)
     judged.may_be_more = std::max(0.0, std::min(judged.posterior.at_most, most_likely(judged.object)) - log_evidence);
@@ -270,7 +319,7 @@ void EventSearch::note_evidence(Judged& judged, double log_evidence) {
 /// Of what was not searched.
 void EventSearch::leave_open(Judged& judged) {
   judged.posterior.unfinished = true;
-  note_evidence(judged, best_ - kHopeless - std::log(judged.hypothesis.prior));
+  note_evidence(judged, best_ - kHopeless - std::log(std::max(kLeastPrior, judged.hypothesis.prior)));
 }
 
 TemperedTarget EventSearch::target_of(const Hypothesis& hypothesis) {
@@ -302,7 +351,8 @@ double EventSearch::evidence_of_nothing(std::size_t object) const {
 double EventSearch::most_likely(std::size_t object) const { return others_[object].most_likely + kLikelierThanSeen; }
 
 double EventSearch::log_posterior(const Judged& judged) const {
-  return std::log(judged.hypothesis.prior) + judged.log_bayes + evidence_of_nothing(judged.object);
+  const double of_reference = others_refer_to(judged) ? 0.0 : evidence_of_nothing(judged.object);
+  return std::log(judged.hypothesis.prior) + judged.log_bayes + of_reference;
 }
 
 core::RandomStream EventSearch::stream_of(const Judged& judged) const {

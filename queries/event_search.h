@@ -57,6 +57,10 @@ class EventSearch {
   core::Status search_rivals();
   core::Status narrow_intervals(const Look& look);
   void tell(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses, const Look& look);
+  static Judged nothing_about(const std::vector<std::size_t>& candidates, std::size_t candidate,
+                              const std::vector<Hypothesis>& hypotheses);
+  bool is_hopeless(const Judged& judged) const;
+  std::ptrdiff_t rivals() const;
   void search(Judged& judged, int runs, const std::function<bool()>& out_of_time);
   void evaluate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<double> log_likelihoods);
   void propose_from_other_touch(const Hypothesis& hypothesis, TemperedTarget& target) const;
@@ -77,7 +81,8 @@ class EventSearch {
   std::vector<Judged> nothings_;
   std::vector<Judged> judged_;
   std::vector<OtherMotion> others_;  // by object; of the candidates
-  double best_ = -1e300;             // greatest log prior + log evidence until now
+  static constexpr double kNoneYet = -1e300;
+  double best_ = kNoneYet;  // greatest log prior + log evidence until now
   int evaluated_ = 0;
   int told_at_ = 0;  // instances at the last look
   bool out_of_time_ = false;

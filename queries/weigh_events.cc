@@ -96,6 +96,9 @@ void weigh_events(std::vector<Judged>& nothings, std::vector<Judged>& judged, do
       nothings.begin(), nothings.end(), [](const Judged& a, const Judged& b) { return a.log_bayes < b.log_bayes; });
   errors.push_back(error_of(*likeliest_nothing, scatter));
   const double tail = 0.5 * (1.0 - confidence);
+  const auto may_be_more = [&](std::size_t i) -> const std::optional<double>& {
+    return i < n ? judged[i].may_be_more : likeliest_nothing->may_be_more;
+  };
   std::vector<std::vector<double>> drawn(n + 1);
   const core::RandomStream stream(seed, core::Purpose::kResample);
   for (int d = 0; d < kPosteriorDraws; ++d) {
@@ -114,7 +117,7 @@ void weigh_events(std::vector<Judged>& nothings, std::vector<Judged>& judged, do
     // much its runs scatter.
     // What was not searched to its end may have any evidence between what was found and the most that can be.
     for (std::size_t i = 0; i <= n; ++i) {
-      const auto& more = i < n ? judged[i].may_be_more : likeliest_nothing->may_be_more;
+      const auto& more = may_be_more(i);
       varied[i] += more ? *more * draws.uniform() : std::max(student(errors[i]), std::log(tail));
     }
     const std::vector<double> sample = shares(varied);
@@ -131,6 +134,12 @@ void weigh_events(std::vector<Judged>& nothings, std::vector<Judged>& judged, do
     one.probability = mean_share;
     one.low = one.posterior.gave_up || one.may_be_more ? 0.0 : std::min(mean_share, at(tail));
     one.high = std::max(mean_share, at(1.0 - tail));
+    // Of many that were not searched, each is rarely the best in these draws, and one of them may be it all the same.
+    if (const auto& more = may_be_more(i)) {
+      std::vector<double> most = log_posterior;
+      most[i] += *more;
+      one.high = std::max(one.high, shares(most)[i]);
+    }
   };
   for (std::size_t i = 0; i < n; ++i) put(i, judged[i]);
   put(n, nothings.front());

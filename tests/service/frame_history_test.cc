@@ -370,9 +370,10 @@ TEST(FrameHistory, TellsWhatIsKnownOfAnExplanationOnTheWay) {
 
   ASSERT_GE(told.answers.size(), 3u);
   const auto& last = told.answers.back();
-  // Before the first, only what comes before all searches: where the box may be seen, and that nothing happened.
+  // Before the first, only what comes before all searches: where the box may be seen.
   const int all = told.answer["explain"]["weighed_instances"];
   EXPECT_LT(told.answers.front().evaluated, all);
+  EXPECT_EQ(told.answers.front().simulated, 0);
   const double found = told.answer["explain"]["explanations"][0]["probability"];
   for (std::size_t i = 0; i < told.answers.size(); ++i) {
     const queries::ExplainAnswer& known = told.answers[i];
@@ -394,10 +395,38 @@ TEST(FrameHistory, TellsWhatIsKnownOfAnExplanationOnTheWay) {
     EXPECT_FALSE(known.text.empty());
   }
   // That something happened is known before it is known what.
-  for (const queries::Explanation& e : told.answers.front().explanations)
+  for (const queries::Explanation& e : told.answers[1].explanations)
     if (e.kind == belief::EventKind::kNothing && !e.present_at_start) {
       EXPECT_LT(e.high, 0.5);
     }
+}
+
+/// Probability by what is explained, in the order of the answer.
+std::map<std::string, queries::Explanation> by_event(const queries::ExplainAnswer& answer) {
+  std::map<std::string, queries::Explanation> all;
+  for (const queries::Explanation& e : answer.explanations)
+    all.emplace(std::string(belief::name_of(e.kind)) + " " + e.object + (e.present_at_start ? " otherwise" : ""), e);
+  return all;
+}
+
+// Where things may move when the window begins, that nothing happens is simulated, too. What is told before that rules
+// nothing out.
+TEST(FrameHistory, TellsOfAnExplanationBeforeAnythingIsSimulated) {
+  const tests::ScratchDir folder;
+  const auto path = folder.path() / "box.mcap";
+  record_change(tests::box_on_table("1.6", ", normal: {position: [0.003, 0.003, 0]}"), {1.2, "box", std::nullopt},
+                path);
+  TrackedRecording recording(path, 1);
+  const ToldOnTheWay told = told_by(recording, quick_question(1.5));  // begins with a box that was seen once or twice
+  ASSERT_GE(told.answers.size(), 3u);
+  EXPECT_LE(told.answers[0].simulated, 1) << "where everything most probably would be";
+  EXPECT_GT(told.answers[1].simulated, 1) << "nothing";
+  const auto at_first = by_event(told.answers.front()), in_the_end = by_event(told.answers.back());
+  for (const auto& [event, found] : in_the_end) {
+    ASSERT_TRUE(at_first.contains(event)) << event;
+    EXPECT_LE(at_first.at(event).low, found.probability + 1e-6) << event;
+    EXPECT_GE(at_first.at(event).high, found.probability - 1e-6) << event;
+  }
 }
 
 TEST(FrameHistory, GivesAsMuchOfAWindowThatNobodyAskedForAsItHas) {
