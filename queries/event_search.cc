@@ -193,10 +193,7 @@ core::Status EventSearch::search_rivals() {
   const bool unexplained = std::any_of(judged_.begin(), judged_.end(), [&](const Judged& judged) {
     return judged.hypothesis.kind == EventKind::kOther && log_posterior(judged) >= best_ - 1e-9;
   });
-  // Without a rival its probability is known, and runs are for its parameters.
-  const int runs_alone = std::max(2, query_.runs / 2);
   for (int runs = kFirstRuns; runs < query_.runs; ++runs) {
-    if (!unexplained && runs >= runs_alone && rivals() < 2) return core::ok_status();
     for (std::vector<Judged>* some : {&nothings_, &judged_})
       for (Judged& judged : *some) {
         if (judged.hypothesis.kind == EventKind::kOther || runs_of(judged) > runs) continue;
@@ -213,13 +210,6 @@ core::Status EventSearch::search_rivals() {
 /// Whether more runs of it can change no probability.
 bool EventSearch::is_hopeless(const Judged& judged) const {
   return judged.posterior.gave_up || log_posterior(judged) + judged.may_be_more.value_or(0.0) <= best_ - kHopeless;
-}
-
-/// Explanations that compete, with nothing as one.
-std::ptrdiff_t EventSearch::rivals() const {
-  const auto competes = [this](const Judged& judged) { return !is_hopeless(judged); };
-  return std::count_if(judged_.begin(), judged_.end(), competes) +
-         (std::any_of(nothings_.begin(), nothings_.end(), competes) ? 1 : 0);
 }
 
 /// More runs of those whose intervals are wide, as long as there is time.
