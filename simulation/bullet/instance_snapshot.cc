@@ -113,7 +113,7 @@ InstanceWorld::Footing InstanceWorld::footing(int object, const Vector3d& down) 
   for (const SolverContact& c : contacts_) {
     if ((c.body_a != object && c.body_b != object) || c.gap > scene_->options.touching_distance) continue;
     const int other = c.body_a == object ? c.body_b : c.body_a;
-    footing.others = footing.others || other < scene_->object_count;
+    footing.others = footing.others || (other < scene_->object_count && free(other));
     footing.height = std::max(footing.height, down.dot(c.position - center_of_mass(object)));
     footprint_.push_back(c.position);
   }

@@ -35,7 +35,8 @@ LaneFooting footing_of(LaneEngine& engine, int slot, int object) {
           from_center + R * Vector3d(static_cast<double>(c.position[0]), static_cast<double>(c.position[1]),
                                      static_cast<double>(c.position[2]));
       footing.height = std::max(footing.height, down.dot(r));
-      others = others || first != object || (other >= 0 && other < engine.objects());
+      const int bearer = first != object ? first : other;
+      others = others || (bearer >= 0 && bearer < engine.objects() && engine.motion(slot, bearer) != LaneMotion::kHeld);
       if (!others) points[count++] = {u.dot(r), v.dot(r)};
     }
   }

@@ -9,7 +9,8 @@ namespace prescene::simulation {
 
 /// What an object stands on. After LaneEngine::find_contacts, by which the slot has not moved.
 struct LaneFooting {
-  bool firm = false;    ///< On what is no object, the vertical through the centre of mass well inside of the contacts.
+  bool firm =
+      false;  ///< On what is fixed or held, the vertical through the centre of mass well inside of the contacts.
   double height = 0.0;  ///< Of the centre of mass above the lowest contact.
 };
 LaneFooting footing_of(LaneEngine& engine, int slot, int object);

@@ -25,6 +25,46 @@ TEST_P(StepperContract, ATiltTurnsTheHeldObjectAboutItsPivot) {
   EXPECT_LT((end.X_WO.translation - Vector3d(0.10, 0.0, 0.50)).norm(), fine(1e-9));
 }
 
+// The tray has carried the block so slowly that it was calm all the while: when the tilt is over, it has not come to
+// rest.
+TEST_P(StepperContract, WhatSlidesDownATrayThatWasTiltedSlowlyIsNotAtRest) {
+  const double angle = 20.0 * kPi / 180.0, over = 2.1, duration = 3.5;
+  for (const double more : {-0.02, 0.02}) {
+    ObjectModel tray = primitive_model("tray", BoxShape{{1.0, 1.0, 0.04}});
+    ObjectModel block = primitive_model("block", BoxShape{{0.1, 0.1, 0.04}});
+    tray.contact.friction = belief::FixedScalar{1.0};
+    block.contact.friction = belief::FixedScalar{std::tan(angle) + more};
+    Scene scene = floor_scene(tray);
+    add_object(scene, block, "block");
+    belief::KinematicBody hand;
+    hand.name = "hand";
+    hand.collision = {belief::PrimitiveShape{BoxShape{{0.1, 0.1, 0.02}}, Pose{}}};
+    hand.timeline = {{0.0, Pose::from_translation({0.0, 0.0, 0.97})}};
+    scene.robot.push_back(hand);
+    scene.objects[0].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 1.0})};
+    scene.objects[0].held_by = "hand";
+    scene.objects[1].pose = belief::FixedPose{Pose::from_translation({0.0, 0.0, 1.04})};
+    belief::Tilt tilt;
+    tilt.object = "object";
+    tilt.axis_W = Vector3d::UnitY();
+    tilt.angle = angle;
+    tilt.duration = 2.0;
+    const belief::Trajectory run = run_actions(scene, {{over - tilt.duration, tilt}}, duration);
+    const std::vector<belief::ObjectState>& end = run.final().objects;
+    const double way = (end[0].X_WO.inverse() * end[1].X_WO.translation - Vector3d(0.0, 0.0, 0.04)).norm();
+    if (more < 0.0) {
+      EXPECT_EQ(run.end, TrajectoryEnd::kDuration);
+      // It has begun a little before, at the angle of its friction.
+      EXPECT_GT(way, 0.5 * kG * std::cos(angle) * 0.02 * (duration - over) * (duration - over));
+      EXPECT_LT(way, 0.5 * kG * std::cos(angle) * 0.02 * (duration - over + 0.15) * (duration - over + 0.15));
+    } else {
+      EXPECT_EQ(run.end, TrajectoryEnd::kAtRest);
+      EXPECT_LT(run.final().time, over + 0.5);
+      EXPECT_LT(way, 1e-3);
+    }
+  }
+}
+
 /// The hand of held_scene(), at rest, with a second object 0.3 m beside the first.
 inline Scene two_held_scene() {
   Scene scene = held_scene();

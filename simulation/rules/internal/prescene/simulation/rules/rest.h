@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // When calm objects are at rest. Every stepper asks the same:
 //
-// - stands firmly: an object that only fixed bodies touch is stable when the vertical through its centre of mass passes
-//   inside the polygon of its contacts, farther from every side than a nudge tilts it (stands_firmly());
+// - stands firmly: an object that only fixed bodies and held objects touch is stable when the vertical through its
+//   centre of mass passes inside the polygon of its contacts, farther from every side than a nudge tilts it
+//   (stands_firmly()); no action is to come, so that what is held stays where it is;
 // - creeps: what stands firmly and still moves at more than kCreepSpeed slides down a slope that hardly holds it;
 // - balances: all others (on an edge or tip, round, leaning, stacked) are nudged: in a copy of the instance each is
 //   turned by kNudge about kNudgeAxes horizontal axes in turn, and a simulation of nudge_window() shows whether it
