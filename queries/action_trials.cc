@@ -2,6 +2,7 @@
 #include "action_trials.h"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
 #include "foresee.h"
@@ -13,8 +14,6 @@
 namespace prescene::queries {
 namespace {
 
-// As of predictions: what "ever" and "always" are looked at, s.
-constexpr double kLookInterval = 0.02;
 constexpr double kNoticedOverlap = 0.002;  // m
 // What simulators draw in actions is told apart by the number of the instance: fresh ones have this bit.
 constexpr std::uint32_t kFreshNumbers = 1U << 31U;
@@ -23,11 +22,6 @@ int most_dimensions(const simulation::StartDistribution& starts) {
   int most = 0;
   for (const simulation::StartComponent& component : starts.components) most = std::max(most, component.dimensions);
   return most;
-}
-
-bool needs_states(const WantedOutcome& wanted) {
-  if (!wanted.group) return belief::needs_states_along_the_way(wanted.outcome);
-  return std::any_of(wanted.group->outcomes.begin(), wanted.group->outcomes.end(), belief::needs_states_along_the_way);
 }
 
 }  // namespace
@@ -53,7 +47,9 @@ ActionTrials::ActionTrials(const Prior& prior, PlannedAction& plan, const Wanted
   request_.stop.duration = duration;
   request_.stop.stop_at_rest = scene_->stop_at_rest;
   request_.stop.world_radius = belief::world_radius(*scene_);
-  request_.sample_interval = needs_states(wanted) ? kLookInterval : 0.0;
+  request_.sample_interval = judging_interval(
+      wanted.group ? std::span(wanted.group->outcomes) : std::span<const belief::Outcome>(&wanted.outcome, 1),
+      simulator);
 }
 
 std::vector<double> ActionTrials::values_at(std::span<const double> point) const {

@@ -12,9 +12,10 @@
 namespace prescene::queries {
 namespace {
 
-// States between which "ever" and "always" are not looked at; 20 ms is 4 cm at the speed of a fall from a table's
-// height.
+// s, of things of household size; 20 ms is up to 10 cm of a fall.
 constexpr double kJudgingInterval = 0.02;
+// m/s, after a fall from 1.3 m, and more of large things. Volumes are looked into as often as this passes through them.
+constexpr double kPassingSpeed = 5.0;
 constexpr double kTimelineInterval = 1.0 / 30.0;
 // Where nothing is asked but where things end, as many instances as a heat map of good quality takes.
 constexpr int kUnaskedInstances = 256;
@@ -23,16 +24,39 @@ constexpr std::size_t kRecordBytes = 256, kContactsBytes = 4096;
 // Object states of a run in an answer: an answer holds twelve such, about 3 MB each.
 constexpr double kMostStatesTold = 8000.0;
 
-bool needs_states_along_the_way(const belief::Scene& scene) {
-  const auto needs = [](const belief::Outcome& outcome) { return belief::needs_states_along_the_way(outcome); };
-  return std::any_of(scene.outcomes.begin(), scene.outcomes.end(), needs) ||
-         std::any_of(scene.exclusive_outcomes.begin(), scene.exclusive_outcomes.end(),
-                     [&](const belief::ExclusiveOutcomes& group) {
-                       return std::any_of(group.outcomes.begin(), group.outcomes.end(), needs);
-                     });
+/// The shorter of two intervals, of which 0 stands for none.
+double shorter(double a, double b) { return a > 0.0 && b > 0.0 ? std::min(a, b) : std::max(a, b); }
+
+double judging_interval(const belief::Outcome& outcome, const simulation::Simulator& simulator) {
+  if (!belief::needs_states_along_the_way(outcome)) return 0.0;
+  // Times and speeds of similar things grow with the square root of their size; but small things, too, fall from
+  // tables.
+  const double similar = std::sqrt(simulator.length_scale());
+  const double usual = kJudgingInterval * std::min(1.0, similar), step = simulator.step_size();
+  double passing = usual;
+  for (const belief::Condition& condition : belief::all_conditions(outcome)) {
+    const auto* inside = std::get_if<belief::InsideVolume>(&condition.predicate);
+    if (inside && condition.when != belief::When::kAtEnd && inside->hollow_of.empty())
+      passing = std::min(passing, inside->size.minCoeff() / (kPassingSpeed * std::max(1.0, similar)));
+  }
+  // States are of whole steps: never farther apart than that.
+  return passing < usual ? std::max(1.0, std::floor(passing / step)) * step : std::max(usual, step);
+}
+
+double judging_interval(const belief::Scene& scene, const simulation::Simulator& simulator) {
+  double interval = queries::judging_interval(scene.outcomes, simulator);
+  for (const belief::ExclusiveOutcomes& group : scene.exclusive_outcomes)
+    interval = shorter(interval, queries::judging_interval(group.outcomes, simulator));
+  return interval;
 }
 
 }  // namespace
+
+double judging_interval(std::span<const belief::Outcome> outcomes, const simulation::Simulator& simulator) {
+  double interval = 0.0;
+  for (const belief::Outcome& outcome : outcomes) interval = shorter(interval, judging_interval(outcome, simulator));
+  return interval;
+}
 
 core::Cancellation end_of_simulating(const QueryContext& context) {
   static const core::Cancellation kNever;
@@ -57,7 +81,7 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   foresight.request.stop.duration = duration;
   foresight.request.stop.stop_at_rest = scene->stop_at_rest;
   foresight.request.stop.world_radius = belief::world_radius(*scene);
-  foresight.request.sample_interval = needs_states_along_the_way(*scene) ? kJudgingInterval : 0.0;
+  foresight.request.sample_interval = judging_interval(*scene, *foresight.simulator);
   foresight.variables = simulation::variables_of(scene, scene->outcomes, scene->exclusive_outcomes);
   const std::size_t objects = scene->objects.size();
   foresight.scene = std::move(scene);

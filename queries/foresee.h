@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,10 @@ struct ForesightDetail {
   /// estimate then. May be empty.
   std::function<void(const Foresight& foresight, const simulation::OutcomeEstimate& so_far)> so_far = {};
 };
+/// s: between the states at which "ever" and "always" are judged; 0 where no outcome has either. 20 ms, less of small
+/// things, and where what falls from a table would pass through a volume in less; at least a step.
+double judging_interval(std::span<const belief::Outcome> outcomes, const simulation::Simulator& simulator);
+
 /// Requested when the question is cancelled, and from QueryContext::simulate_until on.
 core::Cancellation end_of_simulating(const QueryContext& context);
 

@@ -10,6 +10,7 @@
 #include "prescene/queries/query_engine.h"
 #include "prescene/simulation/bullet/bullet_simulator.h"
 #include "prescene/simulation/bullet/convex_decomposition.h"
+#include "prescene/simulation/similarity.h"
 #include "tests/support/paths.h"
 
 namespace prescene::queries {
@@ -54,14 +55,19 @@ std::shared_ptr<belief::Scene> scene_with(belief::ObjectModel model, belief::Pos
   return scene;
 }
 
+/// `similar`: small things as the program simulates them, else as they are.
 PredictAnswer predicted(std::shared_ptr<belief::Scene> scene, double tolerance,
-                        const simulation::BulletOptions& options = {}) {
+                        const simulation::BulletOptions& options = {}, bool similar = false) {
   core::ThreadPool pool(2);
   simulation::ShapeStore shapes(simulation::hacd_decomposer());
   QueryContext context;
   context.pool = &pool;
-  context.make_simulator = [&](const belief::Scene& asked, double) {
-    return simulation::make_bullet_simulator(asked, shapes, options);
+  context.make_simulator = [&](const belief::Scene& asked,
+                               double) -> core::Result<std::unique_ptr<simulation::Simulator>> {
+    const simulation::Similarity similarity = similar ? simulation::similarity_of(asked) : simulation::Similarity{};
+    PRESCENE_TRY(auto simulator,
+                 simulation::make_bullet_simulator(simulation::scaled(asked, similarity.inverse()), shapes, options));
+    return simulation::make_scaled_simulator(std::move(simulator), similarity);
   };
   belief::PredictQuery query;
   query.effort.tolerance = tolerance;
@@ -112,6 +118,22 @@ TEST(Mechanics, ATiltedBoxTipsBeyondItsBalance) {
     expect_covers(answer.outcomes[0], 1.0 - core::normal_cdf((balance - mean) / deviation), 0.0087 / deviation * 0.4);
     RecordProperty("tips of width " + std::to_string(size.x()),
                    std::to_string(answer.outcomes[0].probability) + " of " + std::to_string(answer.instances));
+  }
+}
+
+// Whatever the height that it falls from, and however small it is: what falls through a volume has been in it.
+TEST(Mechanics, WhatFallsThroughAThinVolumeWasInsideIt) {
+  for (const double size : {1.0, 0.02}) {
+    belief::BoxPose above;
+    above.position = {belief::FixedScalar{0.0}, belief::FixedScalar{0.0},
+                      belief::UniformScalar{0.8 * size, 1.2 * size}};
+    auto scene = scene_with(model_of(geometry::Sphere{0.03 * size}, {}, 0.5, 0.0), above);
+    scene->duration = std::sqrt(size);
+    const Pose X_WV = Pose::from_translation({0.0, 0.0, 0.3 * size});
+    const Vector3d volume(0.2 * size, 0.2 * size, 0.025 * size);
+    scene->outcomes.push_back(
+        {"through", "body", {Condition{belief::InsideVolume{X_WV, volume}, belief::When::kEver}}});
+    EXPECT_EQ(predicted(scene, 0.02, {}, true).outcomes[0].probability, 1.0) << size;
   }
 }
 
