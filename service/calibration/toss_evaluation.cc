@@ -45,6 +45,10 @@ core::Status finish(const MotionDataset& dataset, std::size_t motions, const cor
   if (found->tosses.empty())
     return core::invalid_input(dataset.table_file().string() + ": all simulated throws left the world");
   found->scores = scores_of(found->tosses, stream.at(0, kScoreDraws));
+  if (found->scores.independent < 2)
+    found->remarks.emplace_back(
+        "one motion alone is scored: how far chance moves its scores is not known, and their standard errors are 0; "
+        "record more");
   int moving = 0, lost = 0;
   for (const ScoredToss& toss : found->tosses) {
     moving += toss.moving;
@@ -75,12 +79,12 @@ core::Result<TossEvaluation> evaluate_model(const MotionDataset& dataset, const 
   found.remarks = usable.remarks;
   belief::Scene scene = *with.scene;
   simulation::MotionCalibrationOptions noise;
-  if (const auto flights = std::ranges::count(usable.motions, simulation::MotionBeginning::kFlight,
-                                              &simulation::RecordedMotion::beginning);
+  const std::vector<simulation::RecordedMotion> own = usable.without_twins().motions;
+  if (const auto flights =
+          std::ranges::count(own, simulation::MotionBeginning::kFlight, &simulation::RecordedMotion::beginning);
       flights >= static_cast<std::ptrdiff_t>(kLeastFlights)) {
     const simulation::MotionPrior prior = simulation::motion_prior(scene.model_of(scene.objects[0]));
-    PRESCENE_TRY(const simulation::FlightCalibration flight,
-                 fly(usable.without_twins().motions, flight_prior(scene, prior)));
+    PRESCENE_TRY(const simulation::FlightCalibration flight, fly(own, flight_prior(scene, prior)));
     scene.gravity_W = flight.gravity_W;
     noise.position_noise = flight.position_noise;
     noise.rotation_noise = flight.rotation_noise;

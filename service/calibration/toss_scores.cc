@@ -45,6 +45,15 @@ ScoreValue mean_value(const std::vector<double>& values, const std::vector<std::
   return result;
 }
 
+/// Of what is true or not. Where all agree their spread is no measure of chance: then as if half a toss were otherwise.
+ScoreValue share_value(const std::vector<double>& values, const std::vector<std::vector<std::size_t>>& groups) {
+  ScoreValue result = mean_value(values, groups);
+  const auto count = static_cast<double>(groups.size());
+  if (const auto [low, high] = std::ranges::minmax(values); count > 1.0 && low == high)
+    result.standard_error = std::sqrt(0.5 * (count + 0.5) / count) / (count + 1.0);
+  return result;
+}
+
 ScoreValue quantile_value(const std::vector<double>& values, const std::vector<std::vector<std::size_t>>& groups,
                           double q, core::RandomStream stream) {
   ScoreValue result{quantile(values, q), 0.0};
@@ -135,12 +144,14 @@ TossScores scores_of(std::span<const ScoredToss> tosses, core::RandomStream stre
   TossScores scores;
   scores.n = static_cast<int>(tosses.size());
   scores.independent = static_cast<int>(groups.size());
-  const auto mean_of_each = [&](const auto& of) {
+  const auto of_each = [&](const auto& of) {
     std::vector<double> values;
     for (const ScoredToss& toss : tosses) values.push_back(of(toss));
-    return mean_value(values, groups);
+    return values;
   };
-  scores.right_side = mean_of_each([](const ScoredToss& toss) {
+  const auto mean_of_each = [&](const auto& of) { return mean_value(of_each(of), groups); };
+  const auto share_of = [&](const auto& of) { return share_value(of_each(of), groups); };
+  scores.right_side = share_of([](const ScoredToss& toss) {
     return mode_of(toss.side_probabilities) == static_cast<int>(toss.true_side) ? 1.0 : 0.0;
   });
   scores.brier = mean_of_each([](const ScoredToss& toss) { return toss.brier; });
@@ -150,8 +161,8 @@ TossScores scores_of(std::span<const ScoredToss> tosses, core::RandomStream stre
         mean_of_each([axis](const ScoredToss& toss) { return toss.true_place[axis] - toss.place[axis]; });
   for (std::size_t i = 0; i < kLevels.size(); ++i) {
     const double level = kLevels[i];
-    scores.coverage[i] = {
-        level, mean_of_each([level](const ScoredToss& toss) { return toss.region_mass < level ? 1.0 : 0.0; })};
+    scores.coverage[i] = {level,
+                          share_of([level](const ScoredToss& toss) { return toss.region_mass < level ? 1.0 : 0.0; })};
   }
   std::vector<double> errors;
   for (const ScoredToss& toss : tosses) errors.push_back(toss.error());

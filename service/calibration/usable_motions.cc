@@ -11,6 +11,7 @@
 #include "prescene/core/order_statistics.h"
 #include "prescene/core/text.h"
 #include "prescene/service/calibration/motion_units.h"
+#include "prescene/simulation/calibration/clearance.h"
 #include "prescene/simulation/calibration/find_beginning.h"
 #include "prescene/simulation/calibration/free_fall.h"
 #include "prescene/simulation/calibration/sliding_fit.h"
@@ -57,6 +58,27 @@ std::string touched_text(const MotionRecording& recording, const RecordedRest& r
          " after its beginning, and from " + time(*rest.moves_again) + " on it moved by " +
          millimetres_text(rest.moved) + " and " + core::fixed_text(rest.turned * 180.0 / std::numbers::pi, 0) +
          " degrees; it is used up to there";
+}
+
+/// What is named of a scene whose object would hang in the air where the recorded ones lie; "" where it lies there.
+std::string hanging_text(const UsableMotions& usable, const belief::Scene& scene,
+                         const simulation::Simulator& simulator, core::ThreadPool& pool, double noise) {
+  const double mismatch = simulation::mismatch_of(scene, noise);
+  std::vector<double> gaps;
+  std::size_t resting = 0;
+  for (std::size_t i = 0; i < usable.motions.size(); ++i) {
+    if (!usable.rests[i]) continue;
+    ++resting;
+    const std::size_t middle = usable.rests[i]->first + (usable.rests[i]->last - usable.rests[i]->first) / 2;
+    const std::optional<double> gap =
+        simulation::clearance_of(usable.motions[i].frames[middle].X_WO, scene, simulator, pool);
+    if (gap && *gap > mismatch) gaps.push_back(*gap);
+  }
+  if (2 * gaps.size() <= resting) return {};
+  const std::size_t hanging = gaps.size();
+  return std::to_string(hanging) + " of " + std::to_string(resting) + " recordings rest where the scene's object is " +
+         millimetres_text(core::upper_median(std::move(gaps))) +
+         " above a support: check its shape's size and where the supports are, in the recordings' metres";
 }
 
 core::Status check_stamps(const MotionRecording& recording, const std::optional<RecordedRest>& rest) {
@@ -123,6 +145,8 @@ core::Result<UsableMotions> usable_motions(const MotionDataset& dataset, std::si
         std::to_string(least) + ": record more, or keep parameters as they are (--keep)");
   }
   for (const std::string& reason : refused) usable.remarks.push_back("left out: " + reason);
+  if (std::string hanging = hanging_text(usable, *dataset.scene, *simulator, backends.pool(), noise); !hanging.empty())
+    usable.remarks.push_back(std::move(hanging));
   return usable;
 }
 

@@ -55,11 +55,8 @@ class BeginningFit {
         simulator_(simulator),
         pool_(pool),
         noise_(position_noise),
-        center_(belief::mean(scene.model_of(scene.objects[0]).center_of_mass)) {
-    const double size =
-        geometry::bounding_box(belief::collision_mesh(scene.model_of(scene.objects[0]))).diagonal().norm();
-    mismatch_ = std::max({kLeastMismatch, kMismatchShare * size, kFarOff * noise_});
-  }
+        center_(belief::mean(scene.model_of(scene.objects[0]).center_of_mass)),
+        mismatch_(mismatch_of(scene, position_noise)) {}
 
   core::Result<std::pair<MotionBeginning, std::size_t>> find() const {
     PRESCENE_RETURN_IF_ERROR(check_motion());
@@ -155,6 +152,12 @@ class BeginningFit {
 };
 
 }  // namespace
+
+double mismatch_of(const belief::Scene& scene, double position_noise) {
+  const double size =
+      geometry::bounding_box(belief::collision_mesh(scene.model_of(scene.objects[0]))).diagonal().norm();
+  return std::max({kLeastMismatch, kMismatchShare * size, kFarOff * position_noise});
+}
 
 core::Result<RecordedMotion> find_beginning(std::string name, std::vector<TimedPose> frames, const belief::Scene& scene,
                                             const Simulator& simulator, core::ThreadPool& pool, double position_noise) {

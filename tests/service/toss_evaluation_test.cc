@@ -27,6 +27,7 @@ using service::TossEvaluation;
 using service::TossScores;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class TossEvaluationTest : public ::testing::Test {
  protected:
@@ -153,6 +154,33 @@ TEST_F(TossEvaluationTest, SaysWhyNothingCanBeScored) {
   EXPECT_FALSE(evaluate_model(dataset(tosses(6)), folder_ / "absent.yaml", backends_, 1).ok());
 }
 
+// Three twins are one flight, which does not measure gravity.
+TEST_F(TossEvaluationTest, TwinsOfOneFlightAreScoredWithTheScenesGravity) {
+  std::vector<SimulatedMotion> motions = tosses(1);
+  for (int i = 1; i <= 3; ++i) {
+    motions.push_back(motions[0]);
+    for (geometry::Pose& X : motions.back().X_WO)
+      X = geometry::Pose{geometry::exp_rotation({0.0, 0.0, 0.5 * i}), geometry::Vector3d(0.1 * i, 0.0, 0.0)} * X;
+  }
+  const auto found = evaluate_model(dataset(motions), truth_file({2e-4, 2e-3, 0.0}), backends_, 1);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_EQ(found->scores.n, 4);
+  EXPECT_EQ(found->scores.independent, 1);
+  EXPECT_THAT(found->remarks, Contains(HasSubstr("one motion alone is scored")));
+}
+
+TEST_F(TossEvaluationTest, SaysThatTheSceneIsOfASmallerObject) {
+  const MotionDataset data = dataset(tosses(6));
+  const auto right = evaluate_model(data, truth_file({2e-4, 2e-3, 0.0}), backends_, 1);
+  ASSERT_TRUE(right.ok()) << right.status().message();
+  EXPECT_THAT(right->remarks, Not(Contains(HasSubstr("above a support"))));
+  // Half as large: it would hang 25 mm above the board where a cube of 10 cm lies.
+  write("half.yaml", "model: {box: [0.05, 0.05, 0.05], mass: 0.4}\n");
+  const auto half = evaluate_model(data, folder_ / "half.yaml", backends_, 1);
+  ASSERT_TRUE(half.ok()) << half.status().message();
+  EXPECT_THAT(half->remarks, Contains(HasSubstr(" recordings rest where the scene's object is 2")));
+}
+
 TEST_F(TossEvaluationTest, FoldsKeepTwinsTogetherAndHoldTheTruth) {
   std::vector<SimulatedMotion> motions = tosses(24);
   for (const std::size_t twin : {0U, 4U}) motions.push_back(motions[twin]);
@@ -216,6 +244,23 @@ TEST(TossScoresTest, TwinsAddNoCertainty) {
   // sqrt(2 ln 2) / 2 / 0.01.
   const double density = std::sqrt(2.0 * std::log(2.0)) / 2.0 / 0.01;
   EXPECT_NEAR(once.median_error.standard_error, 0.5 / (density * 20.0), 2e-4);
+}
+
+TEST(TossScoresTest, SharesOfAllAndOfNoneAreNotCertain) {
+  core::RandomStream stream(13, core::Purpose::kTest);
+  for (const std::size_t n : {2U, 24U, 400U}) {
+    std::vector<ScoredToss> tosses;
+    for (std::size_t i = 0; i < n; ++i) {
+      tosses.push_back(made_toss(stream, i));
+      tosses.back().region_mass = 0.7;
+    }
+    const TossScores scores = scores_of(tosses, stream);
+    const double count = static_cast<double>(n), share = 0.5 / (count + 1.0);
+    for (const std::size_t level : {0U, 1U}) {
+      EXPECT_EQ(scores.coverage[level].held.value > 0.5, level == 1);
+      EXPECT_NEAR(scores.coverage[level].held.standard_error, std::sqrt(share * (1.0 - share) / count), 1e-12);
+    }
+  }
 }
 
 TEST(TossScoresTest, TheReliabilityTableCountsEveryProbabilityOnce) {

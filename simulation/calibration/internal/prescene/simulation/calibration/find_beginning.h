@@ -16,6 +16,8 @@ inline constexpr std::size_t kLeastBeginning = 5;
 /// object's size.
 inline constexpr double kLeastMismatch = 0.002;
 inline constexpr double kMismatchShare = 0.05;
+/// m: by that, and by six times the noise of a coordinate, m.
+double mismatch_of(const belief::Scene& scene, double position_noise);
 
 /// What does not fall and is at a support begins sliding. What falls, and by the simulation of its first frames with
 /// the model's means touches nothing for more than kLeastBeginning frames, begins in flight, which ends one frame
