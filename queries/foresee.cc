@@ -64,6 +64,20 @@ core::Cancellation end_of_simulating(const QueryContext& context) {
           context.simulate_until.value_or(core::Cancellation::Clock::time_point::max())};
 }
 
+std::unique_ptr<const simulation::Certifier> certifier_of(const Foresight& foresight, double duration,
+                                                          const QueryContext& context) {
+  // What is certain of a free body is not of one on a joint.
+  if (foresight.variables.empty() || !foresight.scene->joints.empty()) return nullptr;
+  simulation::RunRequest request = foresight.request;
+  request.stop.duration = duration;
+  const core::Cancellation until = end_of_simulating(context);
+  return simulation::make_certifier(foresight.scene, foresight.variables, request,
+                                    {.shapes = context.shapes,
+                                     .edge_rounding = context.edge_rounding,
+                                     .length_scale = foresight.simulator->length_scale(),
+                                     .cancellation = &until});
+}
+
 core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief::Scene> scene, double duration,
                                 const belief::Effort& effort, const QueryContext& context,
                                 const ForesightDetail& detail) {
@@ -109,13 +123,7 @@ core::Result<Foresight> foresee(const Prior& prior, std::shared_ptr<const belief
   options.exact_instances = effort.exact_instances;
   options.keep_contacts = detail.keep_contacts;
   if (foresight.variables.empty()) options.min_instances = kUnaskedInstances;
-  // What is certain of a free body is not of one on a joint.
-  if (!detail.to_rest && !foresight.variables.empty() && foresight.scene->joints.empty())
-    foresight.certifier = simulation::make_certifier(foresight.scene, foresight.variables, foresight.request,
-                                                     {.shapes = context.shapes,
-                                                      .edge_rounding = context.edge_rounding,
-                                                      .length_scale = foresight.simulator->length_scale(),
-                                                      .cancellation = &until});
+  if (!detail.to_rest) foresight.certifier = certifier_of(foresight, duration, context);
   options.certifier = foresight.certifier.get();
   if (detail.so_far)
     options.on_look = [&](const simulation::OutcomeEstimate& so_far) { detail.so_far(foresight, so_far); };

@@ -41,6 +41,11 @@ double judging_interval(std::span<const belief::Outcome> outcomes, const simulat
 /// Requested when the question is cancelled, and from QueryContext::simulate_until on.
 core::Cancellation end_of_simulating(const QueryContext& context);
 
+/// Certifies the outcomes of a foresight that has all but its estimate, were `duration` (s) of it simulated. Null:
+/// nothing can be certified.
+std::unique_ptr<const simulation::Certifier> certifier_of(const Foresight& foresight, double duration,
+                                                          const QueryContext& context);
+
 /// Fails when the duration is out of range, when the memory for a question does not hold it, when no simulator can be
 /// made, when the query was cancelled before an instance was finished, or when every instance failed in the simulator.
 /// The scene's outcomes are what is judged, its actions what is done.

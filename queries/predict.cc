@@ -179,6 +179,18 @@ std::vector<belief::TypicalRun> typical_runs_of(const Foresight& foresight, cons
   return runs;
 }
 
+/// Not of what can't change the outcomes any more, were it simulated as long again: what has fallen and rolls on.
+void remark_on_motion_at_end(const Foresight& foresight, const QueryContext& context,
+                             std::vector<std::string>& remarks) {
+  const double longer = foresight.request.stop.duration;
+  std::optional<std::unique_ptr<const simulation::Certifier>> certifier;  // made when something moves
+  const auto settled = [&](const belief::WorldState& state) {
+    if (!certifier) certifier = certifier_of(foresight, longer + longer, context);
+    return *certifier && (*certifier)->ends(state, longer);
+  };
+  remark_on_unfinished_motion(*foresight.scene, foresight.estimate, foresight.request.stop, settled, remarks);
+}
+
 std::vector<belief::ProbabilityStage> history_of(const Foresight& foresight) {
   std::vector<belief::ProbabilityStage> history;
   for (const simulation::EstimateStage& stage : foresight.estimate.history) {
@@ -281,6 +293,7 @@ core::Result<belief::PredictAnswer> predict(const Prior& prior, const belief::Pr
   answer.remarks = remarks_of(answer, query.effort);
   if (!missing.empty()) answer.remarks.push_back(missing_text(missing));
   remark_on_actions(*foresight.scene, foresight.request.stop.duration, answer.remarks);
+  remark_on_motion_at_end(foresight, context, answer.remarks);
   remark_on_leaving(foresight.estimate, foresight.request.stop.world_radius, answer.remarks);
   if (!flight.ok())
     answer.remarks.push_back("How long nothing can touch anything is not known: " + flight.message() + ".");

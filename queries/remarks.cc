@@ -5,6 +5,7 @@
 #include <set>
 
 #include "model_doubts.h"
+#include "prescene/belief/body_names.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
 #include "prior.h"
@@ -18,6 +19,8 @@ using core::fixed_text;
 constexpr double kManyFailed = 0.01;
 constexpr std::size_t kMostNamed = 3;
 constexpr double kLargeShift = 0.03;  // of a probability: named whatever the interval
+// Of the instances. Fewer change no probability by more than the tolerance that is usual.
+constexpr double kManyMoving = 0.02;
 
 std::string percent(double share, int decimals = 0) { return fixed_text(100.0 * share, decimals) + " %"; }
 std::string points(double shift) { return (shift >= 0.0 ? "+" : "") + fixed_text(100.0 * shift, 1); }
@@ -142,6 +145,41 @@ void remark_on_tolerance(const belief::Basis& basis, const belief::Effort& effor
                       ".");
 }
 
+/// By object of the scene: whether where it is, or that it rests, at the end is what an outcome asks for.
+std::vector<bool> judged_at_end(const belief::Scene& scene) {
+  std::vector<bool> judged(scene.objects.size());
+  const auto note = [&](const std::string& name) {
+    if (const std::optional<int> object = belief::find_object(scene, name))
+      judged[static_cast<std::size_t>(*object)] = true;
+  };
+  const auto look_at = [&](const belief::Outcome& outcome) {
+    for (const belief::Condition& condition : belief::all_conditions(outcome)) {
+      if (condition.when != belief::When::kAtEnd || std::holds_alternative<belief::Touched>(condition.predicate) ||
+          std::holds_alternative<belief::StillMoving>(condition.predicate))
+        continue;
+      note(outcome.object);
+      if (const auto* resting = std::get_if<belief::RestingOn>(&condition.predicate)) note(resting->support);
+    }
+  };
+  for (const belief::ExclusiveOutcomes& group : scene.exclusive_outcomes)
+    for (const belief::Outcome& outcome : group.outcomes) look_at(outcome);
+  for (const belief::Outcome& outcome : scene.outcomes) look_at(outcome);
+  return judged;
+}
+
+/// "ends: other 7.0 %, falls 6.3 %": shares of the classes of a group, the largest first.
+std::string class_shares(const belief::ExclusiveOutcomes& group, const std::vector<double>& shares) {
+  std::vector<std::size_t> order;
+  for (std::size_t c = 0; c < shares.size(); ++c)
+    if (shares[c] > 0.0) order.push_back(c);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return shares[a] > shares[b]; });
+  std::string text = group.name + ":";
+  for (std::size_t i = 0; i < std::min(kMostNamed, order.size()); ++i)
+    text += (i > 0 ? ", " : " ") + (order[i] < group.outcomes.size() ? group.outcomes[order[i]].name : "other") + " " +
+            percent(shares[order[i]], 1);
+  return text;
+}
+
 /// Held by no grip that may slip, when the action comes.
 bool is_held_fast(const belief::Scene& scene, const belief::Action& when, bool held) {
   bool fast = held;
@@ -182,6 +220,52 @@ void remark_on_actions(const belief::Scene& scene, double duration, std::vector<
     else if (belief::is_of_held(action) || std::holds_alternative<belief::Grasp>(action.what))
       held.insert(object);
   }
+}
+
+void remark_on_unfinished_motion(const belief::Scene& scene, const simulation::OutcomeEstimate& estimate,
+                                 const simulation::StopRule& stop,
+                                 const std::function<bool(const belief::WorldState&)>& settled,
+                                 std::vector<std::string>& remarks) {
+  const std::vector<bool> judged = judged_at_end(scene);
+  std::vector<std::pair<double, std::string>> shares;  // of the instances in which an object moves
+  for (const belief::SceneObject& object : scene.objects) shares.emplace_back(0.0, object.name);
+  double share = 0.0;
+  std::vector<std::vector<double>> classes;  // by group; its variable has the same number (simulation::variables_of)
+  for (const belief::ExclusiveOutcomes& group : scene.exclusive_outcomes)
+    classes.emplace_back(group.outcomes.size() + 1);
+  for (const simulation::InstanceRecord& record : estimate.instances) {
+    if (record.failed || record.certified || record.end != belief::TrajectoryEnd::kDuration) continue;
+    const auto moves = [&](std::size_t i) {
+      const belief::ObjectState& object = record.final.objects[i];
+      return judged[i] && object.mode != belief::MotionMode::kHeld && belief::is_moving(object) &&
+             object.X_WO.translation.norm() <= stop.world_radius;
+    };
+    bool any = false;
+    for (std::size_t i = 0; i < judged.size(); ++i) any = any || moves(i);
+    if (!any || (settled && settled(record.final))) continue;
+    share += record.weight;
+    for (std::size_t g = 0; g < classes.size(); ++g)
+      classes[g][static_cast<std::size_t>(record.classes[g])] += record.weight;
+    for (std::size_t i = 0; i < judged.size(); ++i)
+      if (moves(i)) shares[i].first += record.weight;
+  }
+  if (!(share > kManyMoving)) return;
+  std::stable_sort(shares.begin(), shares.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  const auto still = std::count_if(shares.begin(), shares.end(), [](const auto& one) { return one.first > 0.0; });
+  std::string names;
+  for (std::size_t i = 0; i < std::min(kMostNamed, static_cast<std::size_t>(still)); ++i)
+    names += (i > 0 ? ", '" : "'") + shares[i].second + "'" + (still > 1 ? " in " + percent(shares[i].first, 1) : "");
+  if (static_cast<std::size_t>(still) > kMostNamed)
+    names += ", and " + std::to_string(static_cast<std::size_t>(still) - kMostNamed) + " more";
+  std::string outcomes;
+  for (std::size_t g = 0; g < std::min(kMostNamed, classes.size()); ++g)
+    outcomes += (g > 0 ? "; " : " (") + class_shares(scene.exclusive_outcomes[g], classes[g]);
+  if (!outcomes.empty()) outcomes += ")";
+  remarks.push_back("In " + percent(share, 1) + " of the instances " +
+                    (still > 1 ? "things still move (" + names + ")" : names + " still moves") + " when the " +
+                    core::rounded_text(stop.duration) + " s that are simulated end" + outcomes +
+                    ": outcomes that are judged at the end may come out otherwise later. Give "
+                    "a longer 'duration'.");
 }
 
 void remark_on_loose_joints(const belief::Belief& belief, std::vector<std::string>& remarks) {

@@ -2,6 +2,7 @@
 // What one should know before trusting the numbers, in sentences.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "prescene/belief/prediction.h"
 #include "prescene/belief/query.h"
 #include "prescene/belief/scene.h"
+#include "prescene/simulation/outcomes/outcome_estimator.h"
 
 namespace prescene::queries {
 
@@ -18,6 +20,14 @@ std::vector<std::string> remarks_of(const belief::Basis& basis, const belief::Ef
 std::vector<std::string> remarks_of(const belief::PredictAnswer& answer, const belief::Effort& effort);
 /// Actions that change nothing, or not what they seem to: of what nothing holds, or after the end.
 void remark_on_actions(const belief::Scene& scene, double duration, std::vector<std::string>& remarks);
+
+/// What the outcomes judge at the end and still moves freely then, in more than 2 % of the instances: beyond the speeds
+/// of belief::is_moving, and not certified, so that the outcomes may be others later. `settled` says of a state that
+/// its outcomes can't change any more; may be empty.
+void remark_on_unfinished_motion(const belief::Scene& scene, const simulation::OutcomeEstimate& estimate,
+                                 const simulation::StopRule& stop,
+                                 const std::function<bool(const belief::WorldState&)>& settled,
+                                 std::vector<std::string>& remarks);
 
 /// Joints that are left out, as what they hang on, or what hangs on them, is not there now.
 void remark_on_loose_joints(const belief::Belief& belief, std::vector<std::string>& remarks);
