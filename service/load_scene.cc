@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <set>
 #include <tuple>
 
 #include "lockstep_hull.h"
@@ -42,6 +43,14 @@ class MeshRemarks {
     for (const std::string& warning : mesh.warnings)
       if (!counted || warning != mesh.repair.text())
         core::log(log_, core::LogLevel::kWarning, request.path.string() + ": " + warning);
+    // The links of a robot have the colours that its description gives.
+    if (mesh.unread_look && !request.ignores_up) unread_looks_.insert(request.path.string());
+  }
+  /// Names each mesh whose textures are not read.
+  void remark_on_looks(interfaces::FileReport& report) const {
+    for (const std::string& file : unread_looks_)
+      report.remarks.push_back(
+          {file, 0, 0, "", std::string(interfaces::kUnreadLook), std::string(interfaces::kUnreadLookRemedy)});
   }
   /// To be called when all meshes were read.
   void finish(const std::filesystem::path& scene) const {
@@ -55,6 +64,7 @@ class MeshRemarks {
   core::LogSink log_;
   Repairs repairs_;
   int tidied_ = 0;
+  std::set<std::string> unread_looks_;
 };
 
 /// The colours of the meshes that a scene has read.
@@ -230,6 +240,7 @@ core::Result<std::shared_ptr<const belief::Scene>> load_reported_scene(const std
   MeshRemarks remarks(log, Repairs::kEach);
   auto scene = interfaces::parse_scene(text, path.string(), with(options(remarks, path), symmetries), &report);
   if (scene) remark_on_large_surroundings(*scene, path, report);
+  if (scene) remarks.remark_on_looks(report);
   if (scene && symmetries == Symmetries::kSuggested) remark_on_simplified_hulls(*scene, path.string(), report);
   return shared(std::move(scene), report, log);
 }
@@ -272,6 +283,7 @@ core::Result<belief::ObjectModel> load_reported_model(const std::filesystem::pat
   MeshRemarks remarks(log, Repairs::kEach);
   core::Result<belief::ObjectModel> model =
       interfaces::read_model(path, path.stem().string(), with(options(remarks), symmetries), &report);
+  if (model) remarks.remark_on_looks(report);
   if (model && symmetries == Symmetries::kSuggested) remark_on_simplified_hulls(*model, path.string(), report);
   log_warnings(report, log);
   return model;

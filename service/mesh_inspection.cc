@@ -194,6 +194,8 @@ core::Result<MeshInspection> inspect_mesh(const std::filesystem::path& path, con
   found.doubtful_scale = interfaces::scale_hint(found.box, options.read.metres_per_unit);
   found.surface_area = geometry::surface_area(mesh);
   found.remarks = found.loaded.warnings;
+  if (found.loaded.unread_look)
+    found.remarks.push_back(std::string(interfaces::kUnreadLook) + ": " + std::string(interfaces::kUnreadLookRemedy));
 
   PRESCENE_RETURN_IF_ERROR(steps.begin(0.35, "mass"));
   const auto closed = geometry::mass_properties(mesh, options.density);

@@ -6,6 +6,7 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <assimp/Importer.hpp>
 #include <exception>
 #include <new>
@@ -26,6 +27,17 @@ using core::Result;
 using core::Status;
 
 constexpr const char* kConvert = "; convert it to PLY, OBJ or STL, for instance with MeshLab or Blender";
+
+/// Whether it has colours that nothing here reads.
+bool has_look(const aiScene& scene) {
+  const auto is_colored = [](const aiMesh* mesh) { return mesh->HasVertexColors(0); };
+  const auto is_textured = [](const aiMaterial* material) {
+    return material->GetTextureCount(aiTextureType_DIFFUSE) > 0 ||
+           material->GetTextureCount(aiTextureType_BASE_COLOR) > 0;
+  };
+  return std::any_of(scene.mMeshes, scene.mMeshes + scene.mNumMeshes, is_colored) ||
+         std::any_of(scene.mMaterials, scene.mMaterials + scene.mNumMaterials, is_textured);
+}
 
 /// The triangles of one mesh, moved to the root's frame.
 Status append_mesh(const aiMesh& mesh, unsigned number, const aiMatrix4x4& X, const MeshReadOptions& options,
@@ -116,7 +128,7 @@ Result<ImportedMesh> import_scene(const std::filesystem::path& path, MeshFormat 
   }
   RawMesh raw;
   PRESCENE_RETURN_IF_ERROR(append_nodes(*scene, options, &raw));
-  return ImportedMesh{std::move(raw.mesh), std::move(raw.first_non_finite)};
+  return ImportedMesh{std::move(raw.mesh), std::move(raw.first_non_finite), has_look(*scene)};
 }
 
 void import_and_reply(const std::filesystem::path& path, MeshFormat format, const MeshReadOptions& options,
@@ -152,6 +164,7 @@ Result<RawMesh> import_with_assimp(const std::filesystem::path& path, MeshFormat
   RawMesh out;
   out.mesh = std::move(imported->mesh);
   out.first_non_finite = std::move(imported->first_non_finite);
+  out.unread_look = imported->has_look;
   out.up_axis = UpAxis::kY;  // assimp turns COLLADA so, glTF is so.
   return out;
 }

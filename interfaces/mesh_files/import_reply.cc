@@ -19,6 +19,7 @@ constexpr std::uint32_t kMagic = 0x50524d31;
 constexpr std::uint32_t kMesh = 1;
 constexpr std::uint32_t kRefusal = 2;   // The importer says that the file is wrong.
 constexpr std::uint32_t kTooLarge = 3;  // More than the options allow.
+constexpr std::uint32_t kMeshWithLook = 4;
 constexpr std::size_t kMaxText = 400;
 constexpr std::size_t kVertexBytes = 3 * sizeof(double);
 constexpr std::size_t kCornersBytes = 3 * sizeof(std::uint32_t);
@@ -80,7 +81,7 @@ void send_reply(const Result<ImportedMesh>& imported, ChildOutput& out) {
     send_text(imported.status().message(), out);
     return;
   }
-  send(kMesh, out);
+  send(imported->has_look ? kMeshWithLook : kMesh, out);
   send_text(imported->first_non_finite, out);
   const geometry::TriangleMesh& mesh = imported->mesh;
   send(std::uint64_t{mesh.vertices.size()}, out);
@@ -94,7 +95,11 @@ Result<ImportedMesh> decode_reply(std::span<const std::uint8_t> bytes, const Mes
   const auto magic = in.read<std::uint32_t>();
   const auto kind = in.read<std::uint32_t>();
   if (!in.ok() || magic != kMagic) return garbled();
-  if (kind == kMesh) return read_mesh_reply(in, options);
+  if (kind == kMesh || kind == kMeshWithLook) {
+    PRESCENE_TRY(ImportedMesh mesh, read_mesh_reply(in, options));
+    mesh.has_look = kind == kMeshWithLook;
+    return mesh;
+  }
   const std::string text = read_text(in);
   if (!in.ok() || in.remaining() > 0 || text.empty()) return garbled();
   if (kind == kTooLarge) return core::resource_exhausted(text);

@@ -98,6 +98,7 @@ Result<LoadedMesh> finish(RawMesh raw, const MeshReadOptions& options) {
   }
   out.mesh = *std::move(repaired);
   out.colors = colors_after_repair(before, raw.colors, out.mesh.vertices);
+  out.unread_look = raw.unread_look && out.colors.empty();
   if (const auto hint = scale_hint(geometry::bounding_box(out.mesh), options.metres_per_unit))
     out.warnings.push_back(*hint);
   out.warnings.insert(out.warnings.end(), raw.warnings.begin(), raw.warnings.end());

@@ -68,6 +68,7 @@ class ObjParser {
     const std::string_view keyword = words.word();
     if (keyword == "v") return parse_vertex(words, number);
     if (keyword == "f") return parse_face(words, number);
+    if (keyword == "mtllib" || keyword == "usemtl") out_.unread_look = true;
     return core::ok_status();
   }
 

@@ -139,6 +139,7 @@ class Body {
     if (small_faces_ > 0) {
       out_.warnings.push_back(std::to_string(small_faces_) + " faces with fewer than three corners were left out");
     }
+    out_.unread_look = header_.names_texture;
     return std::move(out_);
   }
 

@@ -69,6 +69,7 @@ Status parse_property(TextScanner words, std::vector<PlyElement>* elements) {
 Status parse_header_line(std::string_view line, PlyHeader* header, bool* done) {
   TextScanner words(line);
   const std::string_view keyword = words.word();
+  if (keyword == "comment" && words.word() == "TextureFile") header->names_texture = true;
   if (keyword.empty() || keyword == "comment" || keyword == "obj_info") return core::ok_status();
   if (keyword == "end_header") {
     *done = true;

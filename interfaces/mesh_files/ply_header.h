@@ -39,6 +39,7 @@ enum class PlyEncoding { kText, kLittleEndian, kBigEndian };
 struct PlyHeader {
   std::optional<PlyEncoding> encoding;  ///< Set once the header is read.
   std::vector<PlyElement> elements;
+  bool names_texture = false;  ///< By a comment, as MeshLab and others write it.
   // Where the values begin.
   std::size_t body_line = 1;
   std::size_t body_byte = 0;

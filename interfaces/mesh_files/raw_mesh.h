@@ -21,6 +21,7 @@ struct RawMesh {
   UpAxis up_axis = UpAxis::kZ;        ///< Of the coordinates here: kY where assimp has turned them.
   std::vector<std::string> warnings;
   std::string first_non_finite;  ///< "vertex 7 (line 12)", or empty.
+  bool unread_look = false;      ///< As of LoadedMesh, whatever `colors` has.
 };
 
 core::Result<RawMesh> parse_ply(std::span<const std::uint8_t> bytes, const MeshReadOptions& options);

@@ -88,8 +88,8 @@ void write_mesh_seeds() {
   write_seed("stl", "binary", encode_stl(box));
   write_seed("stl", "text", encode_stl(box, MeshEncoding::kText));
   for (const auto& [name, answer] : std::initializer_list<std::pair<const char*, core::Result<ImportedMesh>>>{
-           {"mesh", ImportedMesh{box, ""}},
-           {"not_finite", ImportedMesh{box, "vertex 7 (mesh 2)"}},
+           {"mesh", ImportedMesh{box, "", false}},
+           {"not_finite", ImportedMesh{box, "vertex 7 (mesh 2)", false}},
            {"refusal", core::invalid_input("'GLTF: no such node'")},
            {"too_large", core::resource_exhausted("has more than the limit")}}) {
     const auto bytes = run_in_child([&answer = answer](ChildOutput& out) { send_reply(answer, out); }, {});

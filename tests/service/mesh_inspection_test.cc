@@ -11,6 +11,7 @@
 
 #include "prescene/core/random.h"
 #include "prescene/geometry/primitives.h"
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/service/backends.h"
 #include "prescene/service/load_scene.h"
 #include "prescene/service/scene_report.h"
@@ -72,6 +73,31 @@ TEST(MeshInspection, ASceneGetsTheModelThatWasFound) {
     EXPECT_EQ(symmetry_text(model->symmetry), c.symmetry);
     EXPECT_LT((model->symmetry.p_BoC - found->symmetry.p_BoC).norm(), 1e-9);
     EXPECT_LT(geometry::radius_about(*model->visual, Vector3d::Zero()), 0.2) << "metres";
+  }
+}
+
+TEST(MeshInspection, TexturesThatAreNotReadAreRemarkedOn) {
+  const tests::ScratchDir folder;
+  const std::string said = std::string(interfaces::kUnreadLook) + ": " + std::string(interfaces::kUnreadLookRemedy);
+  const std::string obj = interfaces::encode_obj(geometry::make_mesh(geometry::BoxShape{Vector3d(0.05, 0.1, 0.2)}));
+  for (const bool textured : {false, true}) {
+    SCOPED_TRACE(textured);
+    const auto path = folder.path() / (textured ? "textured.obj" : "plain.obj");
+    ASSERT_TRUE(interfaces::write_file(path, (textured ? "mtllib box.mtl\nusemtl box\n" : "") + obj).ok());
+    const auto inspected = inspect_mesh(path, {});
+    ASSERT_TRUE(inspected.ok()) << inspected.status().message();
+    EXPECT_EQ(std::count(inspected->remarks.begin(), inspected->remarks.end(), said), textured ? 1 : 0);
+    // Once, though two models have it.
+    const std::string shape = "{mesh: {file: " + path.filename().string() + "}, mass: 1}";
+    interfaces::FileReport report;
+    const auto scene =
+        load_reported_scene("models: {a: " + shape + ", b: " + shape + "}\nobjects: {o: {model: a, pose: {}}}\n",
+                            folder.path() / "scene.yaml", {}, report, Symmetries::kAsWritten);
+    ASSERT_TRUE(scene.ok()) << scene.status().message();
+    EXPECT_EQ(
+        std::count_if(report.remarks.begin(), report.remarks.end(),
+                      [&](const interfaces::Problem& remark) { return remark.text() == path.string() + ": " + said; }),
+        textured ? 1 : 0);
   }
 }
 

@@ -56,6 +56,18 @@ TEST_F(AssimpImport, TurnsGltfFromYUpToZUpAndAppliesItsNodes) {
             Vector3d(0, 2, 10));
 }
 
+TEST_F(AssimpImport, NotesTexturesThatAreNotRead) {
+  EXPECT_FALSE(read("a.gltf", kGltf)->unread_look);
+  std::string textured = kGltf;
+  const std::string mode = R"("mode":4)";
+  textured.replace(textured.find(mode), mode.size(), mode + R"(,"material":0)");
+  textured.insert(textured.rfind('}'), R"(,"materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+ "textures":[{"source":0}],"images":[{"uri":"a.png"}])");
+  const auto mesh = read("b.gltf", textured);
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_TRUE(mesh->unread_look);
+}
+
 TEST_F(AssimpImport, FollowsUnitAndUpAxisOfCollada) {
   const auto first = [&](const char* up, const MeshReadOptions& options) -> Vector3d {
     const auto mesh = read("a.dae", collada(up), options);

@@ -25,6 +25,12 @@ TEST(ImportReply, BringsAMeshToTheBit) {
   ASSERT_TRUE(got.ok()) << got.status().message();
   EXPECT_TRUE(got->mesh == sent.mesh);
   EXPECT_EQ(got->first_non_finite, sent.first_non_finite);
+  for (const bool has_look : {false, true}) {
+    const auto again = decode_reply(bytes_of(ImportedMesh{sent.mesh, "", has_look}), {});
+    ASSERT_TRUE(again.ok()) << again.status().message();
+    EXPECT_EQ(again->has_look, has_look);
+    EXPECT_TRUE(again->mesh == sent.mesh);
+  }
 }
 
 TEST(ImportReply, BringsReasonsFitToBeShown) {
@@ -35,7 +41,7 @@ TEST(ImportReply, BringsReasonsFitToBeShown) {
 }
 
 TEST(ImportReply, IsTrustedInNothing) {
-  const ImportedMesh sent{geometry::make_mesh(geometry::BoxShape{{1, 1, 1}}), ""};
+  const ImportedMesh sent{geometry::make_mesh(geometry::BoxShape{{1, 1, 1}}), "", false};
   const std::vector<std::uint8_t> sound = bytes_of(sent);
   EXPECT_LE(sound.size(), largest_reply({.max_triangles = 12}));
   EXPECT_EQ(decode_reply(sound, {.max_triangles = 11}).status().code(), core::StatusCode::kResourceExhausted);

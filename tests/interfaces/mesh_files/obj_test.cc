@@ -23,7 +23,19 @@ TEST(Obj, ReadsEveryFormOfAFace) {
     ASSERT_TRUE(mesh.ok()) << face << mesh.status().message();
     EXPECT_THAT(mesh->mesh.triangles, ElementsAre(Corners{0, 1, 2}, Corners{0, 2, 3})) << face;
     EXPECT_TRUE(mesh->colors.empty());
+    EXPECT_TRUE(mesh->unread_look) << "its material";
   }
+}
+
+TEST(Obj, MaterialsCountAsUnreadWhereNothingElseGivesColours) {
+  const std::string plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const std::string colored = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nf 1 2 3\n";
+  const auto is_unread = [](const std::string& text) { return decode_text(MeshFormat::kObj, text)->unread_look; };
+  EXPECT_FALSE(is_unread(plain));
+  EXPECT_TRUE(is_unread("mtllib a.mtl\n" + plain));
+  EXPECT_TRUE(is_unread("usemtl red\n" + plain));
+  EXPECT_FALSE(is_unread("# mtllib a.mtl\n" + plain));
+  EXPECT_FALSE(is_unread("mtllib a.mtl\n" + colored));
 }
 
 TEST(Obj, AcceptsFacesBeforeTheirVertices) {

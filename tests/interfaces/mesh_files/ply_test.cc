@@ -127,6 +127,19 @@ TEST(Ply, RefusesASecondElementOfVerticesOrFaces) {
               HasSubstr("line 10: a second element 'face'; only one is read"));
 }
 
+TEST(Ply, ATextureCountsAsUnread) {
+  const auto is_unread = [](const std::string& comment) {
+    return decode_text(MeshFormat::kPly, "ply\nformat ascii 1.0\n" + comment +
+                                             "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                                             "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+                                             "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+        ->unread_look;
+  };
+  EXPECT_FALSE(is_unread(""));
+  EXPECT_FALSE(is_unread("comment made by hand\n"));
+  EXPECT_TRUE(is_unread("comment TextureFile can.png\n"));
+}
+
 core::Result<LoadedMesh> mesh_with_colors(const std::string& type, const std::string& color) {
   const std::string header = "property " + type + " red\nproperty " + type + " green\nproperty " + type + " blue\n";
   return decode_text(MeshFormat::kPly,

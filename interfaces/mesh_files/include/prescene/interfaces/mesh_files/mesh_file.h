@@ -51,7 +51,15 @@ struct LoadedMesh {
   std::vector<geometry::Rgb> colors;  ///< One a vertex, or empty: PLY and OBJ may have them.
   geometry::MeshRepairReport repair;
   std::vector<std::string> warnings;  ///< Sentences for a person: a doubtful unit first, what was repaired.
+  /// The file has textures, OBJ materials, or colours of vertices in a format of which they are not read; `colors` is
+  /// empty.
+  bool unread_look = false;
 };
+
+/// What to say of an unread look, and what to do about it.
+inline constexpr std::string_view kUnreadLook = "its textures and materials are not read, so that it has no colours";
+inline constexpr std::string_view kUnreadLookRemedy =
+    "export it as PLY or OBJ with a colour for each vertex, or give the model a 'color'";
 
 /// By the extension, in either case; nothing for an unknown one.
 std::optional<MeshFormat> mesh_format(const std::filesystem::path& path);

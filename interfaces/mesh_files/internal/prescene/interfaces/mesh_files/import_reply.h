@@ -17,6 +17,7 @@ namespace prescene::interfaces {
 struct ImportedMesh {
   geometry::TriangleMesh mesh;
   std::string first_non_finite;  ///< "vertex 7 (mesh 2)", or empty.
+  bool has_look = false;         ///< Textures, or colours of vertices.
 };
 
 /// For the child.
