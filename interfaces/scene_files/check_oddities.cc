@@ -125,6 +125,9 @@ void add_invalid_scene(const LocatedValue& document, const belief::Scene& scene,
 void warn_of_oddities(const LocatedValue& document, const belief::Scene& scene, Problems& problems) {
   if (scene.supports.empty())
     problems.warn(document.place, "", "the scene has no support, so everything falls", "add a table or a 'ground'");
+  if (scene.objects.empty() && !scene.new_objects)
+    problems.warn(document.place, "", "the scene names no object, so there is nothing to track or to predict",
+                  "name some under 'objects', or let tracking look for others with 'new_objects: true'");
   for (const belief::Action& action : scene.actions) {
     if (action.time <= scene.duration) continue;
     const LocatedValue& at = *document.find("actions");

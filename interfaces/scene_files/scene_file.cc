@@ -146,9 +146,7 @@ void read_sections(const LocatedValue& document, SceneContext& context) {
   const LocatedValue* supports = binder.find("supports");
   const LocatedValue* robot = binder.find("robot");
   binder.read("new_objects", scene.new_objects);
-  const LocatedValue* objects =
-      scene.new_objects ? binder.find("objects")
-                        : binder.require("objects", "name at least one object that may move, or 'new_objects: true'");
+  const LocatedValue* objects = binder.find("objects");
   context.models = read_names(models, problems);
   context.supports = read_names(supports, problems);
   context.robot = read_names(robot, problems);

@@ -54,6 +54,20 @@ TEST(PlausibleScene, CentresOfMassAreInTheShape) {
   }
 }
 
+TEST(PlausibleScene, AnObjectIsNamedUnlessOthersAreLookedFor) {
+  const std::string table = "supports:\n  table: {ground: {size: 4}}\n";
+  // No object is no object, however it is written.
+  for (const char* none : {"", "objects: {}\n"}) {
+    const Read found = read(table + none);
+    EXPECT_EQ(found.errors, "") << none;
+    EXPECT_THAT(found.warnings, HasSubstr("the scene names no object")) << none;
+    const Read looks = read(table + none + "new_objects: true\n");
+    EXPECT_EQ(looks.errors + looks.warnings, "") << none;
+  }
+  // A list of none is still no map.
+  EXPECT_THAT(read(table + "objects: []\n").errors, HasSubstr("give a map of names"));
+}
+
 TEST(PlausibleScene, InertiasAreThoseOfABodyOfThatSizeAndMass) {
   for (const char* large : {"[1000, 1000, 1000]", "[1, 1, 1]", "[0.05, 0.05, 0.05]"})
     EXPECT_THAT(cube(std::string("unit_inertia: ") + large).errors,
