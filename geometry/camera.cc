@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "prescene/geometry/camera.h"
 
-#include <cmath>
+#include <limits>
 #include <string>
 
 #include "prescene/core/check.h"
@@ -11,14 +11,45 @@ namespace prescene::geometry {
 namespace {
 
 constexpr int kMaxImageSize = 16384;
+
+/// What the fields of a camera may be, and what to give instead.
+struct Bounds {
+  double least_focal;
+  double most_focal;
+  const char* focal_remedy;
+  double most_centre;  // to both sides
+  const char* centre_remedy;
+};
+constexpr Bounds kAnyCamera = {std::numeric_limits<double>::denorm_min(), std::numeric_limits<double>::max(),
+                               "give a positive focal length in pixels", std::numeric_limits<double>::max(),
+                               "give a finite principal point in pixels"};
 // Of the cameras of robots: a view of 1 degree over 1600 pixels has 9e4. Beyond it, pixels across a thing of a metre
 // are too many for an int.
-constexpr double kLeastFocal = 1.0;
-constexpr double kMostFocal = 1e5;
-constexpr double kMostCentre = 1e5;
+constexpr Bounds kSensor = {1.0, 1e5, "no camera has that; give the focal length in pixels, from 1 to 1e5", 1e5,
+                            "no camera has that; give the principal point in pixels, from -1e5 to 1e5"};
 
-core::Status field_error(const char* field, double value, const char* remedy) {
-  return core::invalid_input(std::string("camera ") + field + " is " + core::rounded_text(value) + ": " + remedy);
+/// Of the first field that is out of bounds.
+core::Status check(const PinholeCamera& camera, const Bounds& bounds) {
+  constexpr const char* kSizeRemedy = "give a number of pixels from 1 to 16384";
+  struct Field {
+    const char* name;
+    double value, low, high;
+    const char* remedy;
+  };
+  const Field fields[] = {
+      {"width", static_cast<double>(camera.width), 1.0, kMaxImageSize, kSizeRemedy},
+      {"height", static_cast<double>(camera.height), 1.0, kMaxImageSize, kSizeRemedy},
+      {"fx", camera.fx, bounds.least_focal, bounds.most_focal, bounds.focal_remedy},
+      {"fy", camera.fy, bounds.least_focal, bounds.most_focal, bounds.focal_remedy},
+      {"cx", camera.cx, -bounds.most_centre, bounds.most_centre, bounds.centre_remedy},
+      {"cy", camera.cy, -bounds.most_centre, bounds.most_centre, bounds.centre_remedy},
+  };
+  for (const Field& field : fields) {
+    if (field.low <= field.value && field.value <= field.high) continue;
+    return core::invalid_input(std::string("camera ") + field.name + " is " + core::rounded_text(field.value) + ": " +
+                               field.remedy);
+  }
+  return core::ok_status();
 }
 
 }  // namespace
@@ -35,32 +66,8 @@ PinholeCamera PinholeCamera::subsampled(int step, int offset) const {
   return small;
 }
 
-core::Status validate(const PinholeCamera& camera) {
-  const auto size_ok = [](int size) { return size >= 1 && size <= kMaxImageSize; };
-  const auto focal_ok = [](double f) { return std::isfinite(f) && f > 0.0; };
-  constexpr const char* kSizeRemedy = "give a number of pixels from 1 to 16384";
-  constexpr const char* kFocalRemedy = "give a positive focal length in pixels";
-  constexpr const char* kCentreRemedy = "give a finite principal point in pixels";
-  if (!size_ok(camera.width)) return field_error("width", camera.width, kSizeRemedy);
-  if (!size_ok(camera.height)) return field_error("height", camera.height, kSizeRemedy);
-  if (!focal_ok(camera.fx)) return field_error("fx", camera.fx, kFocalRemedy);
-  if (!focal_ok(camera.fy)) return field_error("fy", camera.fy, kFocalRemedy);
-  if (!std::isfinite(camera.cx)) return field_error("cx", camera.cx, kCentreRemedy);
-  if (!std::isfinite(camera.cy)) return field_error("cy", camera.cy, kCentreRemedy);
-  return core::ok_status();
-}
+core::Status validate(const PinholeCamera& camera) { return check(camera, kAnyCamera); }
 
-core::Status validate_sensor(const PinholeCamera& camera) {
-  PRESCENE_RETURN_IF_ERROR(validate(camera));
-  const auto focal_ok = [](double f) { return f >= kLeastFocal && f <= kMostFocal; };
-  const auto centre_ok = [](double c) { return std::abs(c) <= kMostCentre; };
-  constexpr const char* kFocalRemedy = "no camera has that; give the focal length in pixels, from 1 to 1e5";
-  constexpr const char* kCentreRemedy = "no camera has that; give the principal point in pixels, from -1e5 to 1e5";
-  if (!focal_ok(camera.fx)) return field_error("fx", camera.fx, kFocalRemedy);
-  if (!focal_ok(camera.fy)) return field_error("fy", camera.fy, kFocalRemedy);
-  if (!centre_ok(camera.cx)) return field_error("cx", camera.cx, kCentreRemedy);
-  if (!centre_ok(camera.cy)) return field_error("cy", camera.cy, kCentreRemedy);
-  return core::ok_status();
-}
+core::Status validate_sensor(const PinholeCamera& camera) { return check(camera, kSensor); }
 
 }  // namespace prescene::geometry

@@ -118,6 +118,19 @@ TEST(PinholeCamera, WhatNoSensorHasIsRefusedWithItsValue) {
   EXPECT_THAT(validate_sensor(camera).message(), HasSubstr("camera fy is 1e+300: "));
 }
 
+TEST(PinholeCamera, ValidationGivesTheFirstFieldTheBoundsOfItsKind) {
+  // Who follows a remedy is not sent on to a narrower one, nor to a later field first.
+  PinholeCamera camera = kCamera;
+  camera.fx = -1.0;
+  camera.cy = std::nan("");
+  EXPECT_EQ(validate(camera).message(), "camera fx is -1: give a positive focal length in pixels");
+  EXPECT_EQ(validate_sensor(camera).message(),
+            "camera fx is -1: no camera has that; give the focal length in pixels, from 1 to 1e5");
+  camera.fx = 0.5;
+  EXPECT_THAT(validate(camera).message(), HasSubstr("camera cy is nan: give a finite"));
+  EXPECT_THAT(validate_sensor(camera).message(), HasSubstr("camera fx is 0.5: no camera has that"));
+}
+
 TEST(Image, RowsLieOneAfterTheOther) {
   Image<int> image(3, 2, 5);
   image(2, 1) = 7;
