@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
@@ -53,6 +54,53 @@ int make_empty(const std::filesystem::path& path) {
   return 0;
 }
 
+/// The files of create_beside() for remove_files_beside(), which may interrupt any of these calls.
+class FilesBeside {
+ public:
+  void note(const std::filesystem::path& path) {
+    const std::string& text = path.native();
+    if (text.size() >= kMostText) return;
+    for (Slot& slot : slots_) {
+      int expected = kFree;
+      if (!slot.state.compare_exchange_strong(expected, kTaken)) {
+        expected = kNoted;
+        if (!slot.state.compare_exchange_strong(expected, kTaken)) continue;
+        // Whoever made it has renamed or removed it.
+        if (::access(slot.path, F_OK) == 0 || errno != ENOENT) {
+          slot.state.store(kNoted);
+          continue;
+        }
+      }
+      text.copy(slot.path, text.size());
+      slot.path[text.size()] = '\0';
+      slot.process = ::getpid();
+      slot.state.store(kNoted);
+      return;
+    }
+  }
+
+  void remove_all() noexcept {
+    for (Slot& slot : slots_) {
+      int expected = kNoted;
+      if (!slot.state.compare_exchange_strong(expected, kTaken)) continue;
+      if (slot.process == ::getpid()) ::unlink(slot.path);  // not those of a parent
+      slot.state.store(kFree);
+    }
+  }
+
+ private:
+  static constexpr std::size_t kMostText = 4096;  // Linux takes no longer path
+  static constexpr int kFree = 0, kTaken = 1, kNoted = 2;
+  static_assert(std::atomic<int>::is_always_lock_free);  // or a handler could wait for what it interrupts
+  struct Slot {
+    std::atomic<int> state = kFree;
+    pid_t process = 0;
+    char path[kMostText] = {};
+  };
+  std::array<Slot, 64> slots_;
+};
+constinit FilesBeside files_beside;
+
 /// For locks that belong to an open file, not to the process: they go when it is closed.
 struct flock whole_file() {
   struct flock all {};
@@ -83,11 +131,16 @@ Result<std::filesystem::path> create_beside(const std::filesystem::path& path, c
     std::filesystem::path made = path;
     made.replace_filename(".prescene-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".partial");
     const int error = make_empty(made);
-    if (error == 0) return made;
+    if (error == 0) {
+      files_beside.note(made);
+      return made;
+    }
     if (error != EEXIST) return write_error(named.empty() ? path : named, error);
   }
   return write_error(named.empty() ? path : named, EEXIST);
 }
+
+void remove_files_beside() noexcept { files_beside.remove_all(); }
 
 Result<bool> create_new_file(const std::filesystem::path& path) {
   const int error = make_empty(path);

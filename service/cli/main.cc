@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "prescene/core/spelling.h"
+#include "prescene/interfaces/bytes/file.h"
 #include "prescene/interfaces/scene_files/problems.h"
 #include "verb.h"
 
@@ -23,11 +24,17 @@ namespace {
 
 prescene::core::Cancellation cancellation;
 
-// The first Ctrl-C asks the work to stop and keep what is done; a second one ends the program
-// at once.
+extern "C" void end_at_once(int signal_number) {
+  prescene::interfaces::remove_files_beside();
+  std::signal(signal_number, SIG_DFL);
+  std::raise(signal_number);
+}
+
+// The first Ctrl-C asks the work to stop and keep what is done; a second one ends the program at once, without files
+// that are no use to anybody.
 extern "C" void on_interrupt(int signal_number) {
   cancellation.request();
-  std::signal(signal_number, SIG_DFL);
+  std::signal(signal_number, end_at_once);
 }
 
 // Where a terminal ends, its shell says so, and the kernel does once more: neither is a second wish.

@@ -162,6 +162,11 @@ core::Status record_simulation(RecordOptions& options, VerbContext& context) {
   if (keeps) std::filesystem::rename(aside, target, error);
   if (keeps && error) status = core::unavailable(options.output + ": cannot be replaced: " + error.message());
   if (!keeps || error) std::filesystem::remove(aside, error);
+  // Labels of frames that are not recorded would be taken for whole.
+  if (labels && (!keeps || !(status.ok() || cancelled))) {
+    const core::Status discarded = labels->discard();
+    if (!discarded.ok()) core::log(context.log(), core::LogLevel::kWarning, discarded.message());
+  }
   if (cancelled && replaces) return core::cancelled("stopped on request; " + options.output + " is as it was");
   if (cancelled && !keeps) return core::cancelled("stopped on request before the first frame; nothing was recorded");
   if (keeps && bag) {

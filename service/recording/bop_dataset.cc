@@ -252,4 +252,19 @@ core::Status BopDataset::close() {
   return core::ok_status();
 }
 
+core::Status BopDataset::discard() {
+  std::error_code error, failed;
+  std::vector<fs::path> written = {folder_ / "models"};
+  for (const CameraFolder& camera : cameras_) written.push_back(camera.path);
+  for (const fs::path& path : written) {
+    fs::remove_all(path, error);
+    if (error && !failed) failed = error;
+  }
+  if (failed)
+    return core::unavailable(folder_.string() + ": can't be removed: " + failed.message() +
+                             "; remove it, what is in it is not complete");
+  fs::remove(folder_, error);  // only if nothing is in it
+  return core::ok_status();
+}
+
 }  // namespace prescene::service

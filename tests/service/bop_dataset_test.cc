@@ -399,6 +399,32 @@ TEST_F(BopDatasetTest, OnlyANewOrEmptyFolderIsTaken) {
   EXPECT_EQ(text_of(labels_ / "mine"), "precious");
 }
 
+TEST_F(BopDatasetTest, WhatIsDiscardedIsGone) {
+  record();
+  ASSERT_TRUE(fs::exists(in_camera("000000", "scene_gt.json")));
+  const auto scene = load_scene_text(kScene, "scene.yaml", {});
+  ASSERT_TRUE(scene.ok());
+  const auto renderer = backends_.make_renderer();
+  const auto discarded_of = [&](const fs::path& folder) {
+    auto dataset = BopDataset::create(folder, **scene, **renderer);
+    EXPECT_TRUE(dataset.ok()) << dataset.status().message();
+    fs::create_directories(folder / "models");
+    std::ofstream(folder / "models" / "obj_000001.ply") << "a part";
+    return (*dataset)->discard();
+  };
+  const fs::path gone = labels_ / "gone", kept = labels_ / "kept";
+  EXPECT_TRUE(discarded_of(gone).ok());
+  EXPECT_FALSE(fs::exists(gone));
+  // What somebody else wrote meanwhile stays.
+  auto dataset = BopDataset::create(kept, **scene, **renderer);
+  ASSERT_TRUE(dataset.ok()) << dataset.status().message();
+  fs::create_directories(kept / "000000" / "rgb");
+  std::ofstream(kept / "mine") << "precious";
+  EXPECT_TRUE((*dataset)->discard().ok());
+  EXPECT_FALSE(fs::exists(kept / "000000"));
+  EXPECT_EQ(text_of(kept / "mine"), "precious");
+}
+
 TEST_F(BopDatasetTest, ThroughALensThereAreNoLabels) {
   const auto scene = load_scene_text(kScene, "scene.yaml", {});
   ASSERT_TRUE(scene.ok());

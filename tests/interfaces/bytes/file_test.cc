@@ -29,6 +29,29 @@ TEST(ReadFile, ReturnsWhatWriteFileWrote) {
   EXPECT_FALSE(std::filesystem::exists(dir.path() / "a.bin.partial"));
 }
 
+TEST(FilesBeside, AreRemovedUnlessTheyHaveTheNameThatTheyWereFor) {
+  const tests::ScratchDir dir;
+  const auto is_empty = [&] { return std::filesystem::is_empty(dir.path()); };
+  const auto finished = dir.path() / "whole.bin";
+  // More than are remembered, if those that are gone did not make room.
+  for (int i = 0; i < 200; ++i) {
+    const auto aside = create_beside(finished);
+    ASSERT_TRUE(aside.ok()) << aside.status().message();
+    if (i % 2 == 0) std::filesystem::remove(*aside);
+    if (i % 2 == 1) std::filesystem::rename(*aside, finished);
+  }
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(create_beside(finished).ok());
+  remove_files_beside();
+  EXPECT_TRUE(std::filesystem::exists(finished));
+  std::filesystem::remove(finished);
+  EXPECT_TRUE(is_empty());
+  // It can go on afterwards.
+  ASSERT_TRUE(create_beside(finished).ok());
+  EXPECT_FALSE(is_empty());
+  remove_files_beside();
+  EXPECT_TRUE(is_empty());
+}
+
 TEST(ReadFile, NamesThePathAndTheRemedy) {
   const tests::ScratchDir dir;
   const auto missing = read_file(dir.path() / "none.ply", 100).status();

@@ -25,6 +25,10 @@ core::Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& p
 core::Result<std::filesystem::path> create_beside(const std::filesystem::path& path,
                                                   const std::filesystem::path& named = {});
 
+/// Removes what create_beside() made in this process and still has the name that it got there. For a handler of a
+/// signal that ends the process: it calls what such a handler may call. At most 64 files are remembered at a time.
+void remove_files_beside() noexcept;
+
 /// Creates an empty file of this name. False where there is something of that name already, be it a link that leads
 /// nowhere: it stays as it is. kUnavailable as write_file.
 core::Result<bool> create_new_file(const std::filesystem::path& path);

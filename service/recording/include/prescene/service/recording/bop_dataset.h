@@ -44,6 +44,8 @@ class BopDataset {
   core::Status add(const SimulatedFrame& frame);
   /// Writes the JSON files of all frames that were added, if any was.
   core::Status close();
+  /// Removes all that it wrote, and the folder if nothing else is in it. kUnavailable where something stays.
+  core::Status discard();
 
  private:
   struct CameraFolder {
