@@ -103,6 +103,10 @@ std::string_view trimmed(std::string_view text) {
 }
 
 bool parse_number(std::string_view text, double* value) { return parse_whole(text, value); }
+std::optional<double> finite_number(std::string_view text) {
+  double value = 0.0;
+  return parse_number(text, &value) && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
 bool parse_integer(std::string_view text, long long* value) { return parse_whole(text, value); }
 
 }  // namespace prescene::interfaces

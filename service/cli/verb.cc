@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -48,13 +47,6 @@ core::LogSink stderr_log(bool quiet) {
         break;
     }
   };
-}
-
-std::optional<double> finite_number(const std::string& text) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || end != text.c_str() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
 }
 
 /// How wide the terminal on stderr is; 80 where it does not say, or is none.
@@ -196,7 +188,7 @@ std::string error_document(const core::Status& status) {
 
 CLI::Validator positive_number() {
   return {[](std::string& text) -> std::string {
-            const std::optional<double> value = finite_number(text);
+            const std::optional<double> value = interfaces::finite_number(text);
             return value && *value > 0.0 ? "" : "a number above 0 is needed, not '" + text + "'";
           },
           "POSITIVE"};
@@ -205,7 +197,7 @@ CLI::Validator positive_number() {
 CLI::Validator number_between(double low, double high) {
   const std::string range = core::rounded_text(low) + " to " + core::rounded_text(high);
   return {[low, high, range](std::string& text) -> std::string {
-            const std::optional<double> value = finite_number(text);
+            const std::optional<double> value = interfaces::finite_number(text);
             return value && *value >= low && *value <= high
                        ? ""
                        : "a number from " + range + " is needed, not '" + text + "'";
@@ -215,7 +207,7 @@ CLI::Validator number_between(double low, double high) {
 
 CLI::Validator in_range(const belief::ScalarRange& range) {
   return {[range](std::string& text) -> std::string {
-            const std::optional<double> value = finite_number(text);
+            const std::optional<double> value = interfaces::finite_number(text);
             if (!value) return "a number is needed, not '" + text + "'";
             return belief::check_number(*value, range).message();
           },

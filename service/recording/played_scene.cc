@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <functional>
 #include <iterator>
 #include <limits>
@@ -16,6 +15,7 @@
 #include "prescene/belief/validation.h"
 #include "prescene/core/random.h"
 #include "prescene/core/text.h"
+#include "prescene/interfaces/bytes/text.h"
 #include "prescene/simulation/rules/action_draws.h"
 
 namespace prescene::service {
@@ -181,13 +181,6 @@ void apply(const UnannouncedChange& change, const WorldState& start, const Scene
   present[i] = state;
 }
 
-std::optional<double> number(const std::string& text) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || end != text.c_str() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
 std::vector<std::string> split(const std::string& text, char separator) {
   std::vector<std::string> parts(1);
   for (const char c : text) {
@@ -217,7 +210,7 @@ geometry::Pose robot_pose_in(std::span<const PlayedPart> parts, int body, double
 
 core::Result<UnannouncedChange> removal_from_text(const std::string& text) {
   const std::vector<std::string> parts = split(text, ':');
-  const std::optional<double> time = number(parts[0]);
+  const std::optional<double> time = interfaces::finite_number(parts[0]);
   if (parts.size() != 2 || !time || parts[1].empty())
     return core::invalid_input("--remove SECONDS:OBJECT, as 1.5:cup; this is not: " + text);
   return UnannouncedChange{*time, parts[1], std::nullopt};
@@ -229,11 +222,11 @@ core::Result<UnannouncedChange> put_from_text(const std::string& text) {
       "not: " +
       text);
   const std::vector<std::string> parts = split(text, ':');
-  const std::optional<double> time = number(parts[0]);
+  const std::optional<double> time = interfaces::finite_number(parts[0]);
   if (parts.size() != 3 || !time || parts[1].empty()) return bad;
   std::vector<double> values;
   for (const std::string& part : split(parts[2], ',')) {
-    const std::optional<double> value = number(part);
+    const std::optional<double> value = interfaces::finite_number(part);
     if (!value) return bad;
     values.push_back(*value);
   }

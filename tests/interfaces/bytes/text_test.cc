@@ -6,6 +6,7 @@
 #include <clocale>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "prescene/core/utf8.h"
 
@@ -72,6 +73,13 @@ TEST(ParseNumber, TakesTheWholeTextOrNothing) {
   for (const char* text : {"", " 1", "1 ", "1,5", "0x10", "+-1", "++1", "1e", "1e999"}) {
     EXPECT_FALSE(parse_number(text, &value)) << text;
   }
+}
+
+TEST(FiniteNumber, IsAWholeTextThatIsNeitherInfiniteNorNoNumber) {
+  EXPECT_EQ(finite_number("-1.5e3"), -1500.0);
+  EXPECT_EQ(finite_number("+0.25"), 0.25);
+  for (const char* text : {"", "nan", "inf", "-inf", "infinity", "1 ", " 1", "0x10", "1,5", "1e999"})
+    EXPECT_EQ(finite_number(text), std::nullopt) << text;
 }
 
 TEST(ParseInteger, TakesTheWholeTextOrNothing) {

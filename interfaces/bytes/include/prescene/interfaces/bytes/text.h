@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -29,6 +30,8 @@ std::string_view trimmed(std::string_view text);
 
 /// The whole text as a number, or false: no surrounding space, no locale; "nan" and "inf" are numbers.
 bool parse_number(std::string_view text, double* value);
+/// The same, but nothing for "nan" and "inf" either.
+std::optional<double> finite_number(std::string_view text);
 /// The whole text as a decimal integer that fits, or false.
 bool parse_integer(std::string_view text, long long* value);
 
