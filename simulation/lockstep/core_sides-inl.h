@@ -23,11 +23,6 @@ using M = hn::Mask<D>;
 
 HWY_INLINE M all_lanes() { return hn::Eq(set<V>(0.0), set<V>(0.0)); }
 HWY_INLINE M no_lanes() { return hn::Lt(set<V>(0.0), set<V>(0.0)); }
-HWY_INLINE std::uint32_t bits_of(M mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(D(), mask, bytes);
-  return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8;
-}
 
 /// A side of a core: corners counter-clockwise from outside, the last one repeated where lanes have fewer.
 struct Side {

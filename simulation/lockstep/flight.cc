@@ -96,12 +96,6 @@ void fly_lanes(const LockstepScene* scene, int object, const std::span<const std
   }
 }
 
-HWY_INLINE std::uint32_t bits_of(hn::Mask<D> mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(D(), mask, bytes);
-  return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8;
-}
-
 HWY_INLINE const ConvexPart& part_of(const LockstepScene& scene, const PartQuery& query) {
   return scene.bodies[static_cast<std::size_t>(query.object)].parts[static_cast<std::size_t>(query.part)];
 }
@@ -126,7 +120,7 @@ void find_pairs_lanes(const LockstepScene* scene, const PartQuery* query, LaneSt
       const Vec3<V> reach = half + set3<V>(fixed.shape.box_half);
       const auto overlap = hn::And(hn::Le(hn::Abs(apart.x), reach.x),
                                    hn::And(hn::Le(hn::Abs(apart.y), reach.y), hn::Le(hn::Abs(apart.z), reach.z)));
-      std::uint32_t near = bits_of(overlap) & allowed;
+      std::uint32_t near = bits_of(D(), overlap) & allowed;
       if (near == 0) continue;
       if (fixed.shape.kind != CoreKind::kBox) {
         for (int i = 0; i < lanes; ++i) {
@@ -147,11 +141,11 @@ void find_pairs_lanes(const LockstepScene* scene, const PartQuery* query, LaneSt
       const auto over_x = hn::And(hn::Ge(a.x, box.x), hn::And(inner_y, inner_z));
       const auto over_y = hn::And(hn::Ge(a.y, box.y), hn::And(inner_z, inner_x));
       const auto over_z = hn::And(hn::Ge(a.z, box.z), hn::And(inner_x, inner_y));
-      near &= bits_of(in_ball);
+      near &= bits_of(D(), in_ball);
       if (near == 0) continue;
-      const std::uint32_t over[3] = {bits_of(over_x), bits_of(over_y), bits_of(over_z)};
-      const std::uint32_t back[3] = {bits_of(hn::Lt(c.x, zero)), bits_of(hn::Lt(c.y, zero)),
-                                     bits_of(hn::Lt(c.z, zero))};
+      const std::uint32_t over[3] = {bits_of(D(), over_x), bits_of(D(), over_y), bits_of(D(), over_z)};
+      const std::uint32_t back[3] = {bits_of(D(), hn::Lt(c.x, zero)), bits_of(D(), hn::Lt(c.y, zero)),
+                                     bits_of(D(), hn::Lt(c.z, zero))};
       for (int i = 0; i < lanes; ++i) {
         if (!(near >> i & 1U)) continue;
         int face = -1;
@@ -195,7 +189,7 @@ void find_body_pairs_lanes(const LockstepScene* scene, const PartQuery* query, i
           hn::And(hn::Le(dot(apart, apart), ball * ball),
                   hn::And(hn::Le(hn::Abs(apart.x), reach.x),
                           hn::And(hn::Le(hn::Abs(apart.y), reach.y), hn::Le(hn::Abs(apart.z), reach.z))));
-      const std::uint32_t near = bits_of(overlap) & allowed;
+      const std::uint32_t near = bits_of(D(), overlap) & allowed;
       for (int i = 0; near >> i != 0; ++i) {
         if (near >> i & 1U) pairs->shapes[first_part + j].push_back({at + i, at_other + i});
       }

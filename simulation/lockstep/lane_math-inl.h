@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 
 HWY_BEFORE_NAMESPACE();
@@ -31,6 +32,15 @@ HWY_INLINE V set(double value) {
 template <class V>
 HWY_INLINE V select(MOf<V> mask, V yes, V no) {
   return hn::IfThenElse(mask, yes, no);
+}
+
+/// Bit i: that of lane i.
+template <class D>
+HWY_INLINE std::uint32_t bits_of(D d, hn::Mask<D> mask) {
+  static_assert(hn::MaxLanes(D()) <= 16);
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8;
 }
 
 template <class V>

@@ -60,7 +60,7 @@ class NearWriter {
     const V gap = distance - pair_.radii;
     mask = hn::And(mask, hn::Le(gap, pair_.range));
     lowest_ = select(mask, hn::Min(lowest_, gap), lowest_);
-    std::uint32_t bits = bits_of(mask) & lanes_.valid;
+    std::uint32_t bits = bits_of(D(), mask) & lanes_.valid;
     if (bits == 0) return;
     const Vec3<V> middle = pair_.middle + pair_.R_PB * (core - pair_.normal * (pair_.radius_a + set<V>(0.5) * gap));
     HWY_ALIGN double x[kLaneMultiple], y[kLaneMultiple], z[kLaneMultiple], g[kLaneMultiple];

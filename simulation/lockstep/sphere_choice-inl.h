@@ -103,7 +103,7 @@ class ContactChoice {
     if (!(most > static_cast<Real>(least))) return -1;
     const V enough = one_lane(most - static_cast<Real>(same) * most);
     for (std::size_t i = 0; i < end_; i += hn::Lanes(D())) {
-      const std::uint32_t bits = bits_of(hn::Ge(at(FoundContacts::kScore, i), enough));
+      const std::uint32_t bits = bits_of(D(), hn::Ge(at(FoundContacts::kScore, i), enough));
       if (bits != 0) return static_cast<int>(i) + std::countr_zero(bits);
     }
     return -1;

@@ -282,7 +282,7 @@ class CoreMeeting {
     const V least = one_lane(std::min(most - 2 * rows.ball, -rows.ball) - Real(1e-5));
     faces_.clear();
     for (std::size_t f = 0; f < count; f += hn::Lanes(d)) {
-      const std::uint32_t chosen = bits_of(hn::Ge(hn::LoadU(d, heights_.data() + f), least));
+      const std::uint32_t chosen = bits_of(D(), hn::Ge(hn::LoadU(d, heights_.data() + f), least));
       for (std::uint32_t bits = chosen; bits != 0; bits &= bits - 1)
         faces_.push_back(static_cast<std::int32_t>(f) + static_cast<std::int32_t>(std::countr_zero(bits)));
     }
@@ -343,7 +343,7 @@ inline void meet_core_lanes(const SphereQuery* query, SphereScratch* scratch) {
         meeting.meet(spheres.patches[static_cast<std::size_t>(node.first)], at, near);
         continue;
       }
-      for (std::uint32_t bits = bits_of(near); bits != 0; bits &= bits - 1)
+      for (std::uint32_t bits = bits_of(D(), near); bits != 0; bits &= bits - 1)
         stack.push_back(node.first + static_cast<std::int32_t>(at) + static_cast<std::int32_t>(std::countr_zero(bits)));
     }
   }

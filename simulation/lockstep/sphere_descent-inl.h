@@ -89,7 +89,7 @@ class SphereDescent {
         for (std::size_t at = 0; at < count_b; at += hn::Lanes(d)) {
           const Vec3<V> apart = Vec3<V>{load(x, at), load(y, at), load(z, at)} - centre;
           const V limit = reach + load(of_b.radius, at);
-          near |= bits_of(hn::Le(dot(apart, apart), limit * limit)) << at;
+          near |= bits_of(D(), hn::Le(dot(apart, apart), limit * limit)) << at;
         }
         near &= (1U << count_b) - 1U;
         if (near == 0) continue;
@@ -188,7 +188,7 @@ class SphereDescent {
     for (std::size_t at = 0; at < count; at += hn::Lanes(D())) {
       const Vec3<V> apart = Vec3<V>{load(of_a.x, at), load(of_a.y, at), load(of_a.z, at)} - centre;
       const V limit = reach + load(of_a.radius, at);
-      near |= bits_of(hn::Le(dot(apart, apart), limit * limit)) << at;
+      near |= bits_of(D(), hn::Le(dot(apart, apart), limit * limit)) << at;
     }
     return near & ((1U << count) - 1U);
   }
@@ -241,7 +241,7 @@ class SphereDescent {
       if (bits == 0) continue;
       const M wanted = lanes_in(bits);
       const PatchLanes b(of_b, at);
-      const std::uint32_t edges = bits_of(hn::And(wanted, b.edge));
+      const std::uint32_t edges = bits_of(D(), hn::And(wanted, b.edge));
       M a_over, b_over;  // A's sphere over B's patches, B's spheres over A's patch
       if (edge) {
         for (std::uint32_t left = edges; left != 0; left &= left - 1) {
@@ -295,7 +295,7 @@ class SphereDescent {
     const M mine = hn::Lt(away, one_lane(best_a.away[i]));
     if (hn::AllFalse(d, mine)) return;
     const Real least = hn::GetLane(hn::MinOfLanes(d, away));
-    const auto lane = static_cast<std::int32_t>(std::countr_zero(bits_of(hn::Eq(away, one_lane(least)))));
+    const auto lane = static_cast<std::int32_t>(std::countr_zero(bits_of(D(), hn::Eq(away, one_lane(least)))));
     best_a.away[i] = least;
     best_a.partner[i] = static_cast<Real>(rows_b * kNodeWidth + static_cast<std::int32_t>(at) + lane);
   }

@@ -110,7 +110,7 @@ class SphereMeeting : private SphereDescent {
   void offer(const ContactLanes& c, M wanted, const Batch& batch, std::size_t at) {
     found_.reserve(kNodeWidth);
     append(c, gap_at_end(query_, c, dt_), wanted, found_);
-    for (std::uint32_t bits = bits_of(wanted); bits != 0; bits &= bits - 1)
+    for (std::uint32_t bits = bits_of(D(), wanted); bits != 0; bits &= bits - 1)
       pairs_.contacts.push_back(batch.ids[at + static_cast<std::size_t>(std::countr_zero(bits))]);
   }
 

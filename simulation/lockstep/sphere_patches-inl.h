@@ -19,11 +19,6 @@ using D = hn::CappedTag<Real, kNodeWidth>;
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 
-HWY_INLINE std::uint32_t bits_of(M mask) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(D(), mask, bytes);
-  return bytes[0] | static_cast<std::uint32_t>(bytes[1]) << 8;
-}
 HWY_INLINE V load(const SphereLanes::Row& row, std::size_t at) { return hn::Load(D(), row.data() + at); }
 HWY_INLINE Vec3<V> load(const std::array<SphereLanes::Row, 3>& rows, std::size_t at) {
   return {load(rows[0], at), load(rows[1], at), load(rows[2], at)};
@@ -129,7 +124,7 @@ HWY_INLINE Vec3<V> towards_center(const Vec3<V>& spin, const Vec3<V>& from_cente
 /// Appends the lanes wanted, in their order. There must be room for a vector.
 HWY_INLINE void append(const ContactLanes& c, V at_end, M wanted, FoundContacts& found) {
   const D d;
-  const std::uint32_t bits = bits_of(wanted);
+  const std::uint32_t bits = bits_of(D(), wanted);
   const auto size = static_cast<std::size_t>(found.size());
   // Compress of this Highway copies its table of a kilobyte each time.
   const auto put = [&](FoundContacts::Row row, V value) HWY_ATTR {
