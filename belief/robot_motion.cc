@@ -159,8 +159,7 @@ class Plan {
   }
 
   Pose timeline_pose(int hand, double time) const {
-    const KinematicBody& body = scene_.robot[static_cast<std::size_t>(hand)];
-    return body.timeline.empty() ? Pose{} : pose_at(body, time);
+    return pose_at(scene_.robot[static_cast<std::size_t>(hand)], time);
   }
 
   const Scene& scene_;

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "prescene/core/check.h"
-
 namespace prescene::belief {
 namespace {
 
@@ -28,7 +26,7 @@ bool operator==(const KinematicBody& a, const KinematicBody& b) {
 }
 
 Pose pose_at(const KinematicBody& body, double time) {
-  PRESCENE_CHECK(!body.timeline.empty());
+  if (body.timeline.empty()) return {};
   const auto after =
       std::upper_bound(body.timeline.begin(), body.timeline.end(), time,
                        [](double t, const KinematicBody::Waypoint& waypoint) { return t < waypoint.time; });

@@ -59,8 +59,7 @@ void ActionPlayer::reset(const std::vector<belief::Action>& actions, const belie
 }
 
 Pose ActionPlayer::timeline_pose(int robot, double time) const {
-  const belief::KinematicBody& body = scene_->robot[static_cast<std::size_t>(robot)];
-  return body.timeline.empty() ? Pose{} : belief::pose_at(body, time);
+  return belief::pose_at(scene_->robot[static_cast<std::size_t>(robot)], time);
 }
 
 Pose ActionPlayer::robot_pose(int robot, double time) const {

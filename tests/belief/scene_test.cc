@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "prescene/belief/body_names.h"
+#include "prescene/belief/robot_motion.h"
 #include "prescene/belief/scene_size.h"
 #include "prescene/belief/validation.h"
 #include "prescene/core/sobol.h"
@@ -27,6 +28,16 @@ TEST(PoseAt, HoldsTheEndsAndInterpolatesBetween) {
   EXPECT_EQ(pose_at(body, 5.0), X_b);
   const Pose expected{geometry::exp_rotation({0.0, 0.0, 0.25}), Vector3d(0.5, 0.0, 1.0)};
   EXPECT_THAT(pose_at(body, 1.5), tests::is_near(expected, 1e-12, 1e-12));
+}
+
+TEST(PoseAt, IsTheOriginForABodyWithoutATimeline) {
+  EXPECT_EQ(pose_at({}, 1.0), Pose{});
+  Scene scene;
+  scene.robot.emplace_back().name = "hand";
+  // The same with actions and without.
+  const std::vector<Action> actions = {{0.5, Push{}}};
+  EXPECT_EQ(robot_pose_at(scene, {}, 0, 1.0), Pose{});
+  EXPECT_EQ(robot_pose_at(scene, actions, 0, 1.0), Pose{});
 }
 
 TEST(WorldRadius, GrowsWithThingsThatAreLargerThanAHouseholds) {

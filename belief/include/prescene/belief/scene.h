@@ -46,7 +46,7 @@ struct KinematicBody {
   std::vector<Waypoint> timeline;
   friend bool operator==(const KinematicBody& a, const KinematicBody& b);
 };
-/// X_WG at a time (s since the scene's start), interpolated. The timeline is not empty (checked).
+/// X_WG at a time (s since the scene's start), interpolated. A body without a timeline is at the world's origin.
 Pose pose_at(const KinematicBody& body, double time);
 
 /// An object of the scene: which model, and what is known of its start.
