@@ -199,7 +199,6 @@ void ParticleFilter::first_look(FrameStep& step, FindWhich which) {
                                   static_cast<std::uint32_t>(step.observation.camera));
   const FindReport report =
       find_in_frame(step.frame, step.observation, settings_.initialise, tools_, stream, result.belief, which);
-  result.counters.looked_for = report.looked_for;
   result.counters.found = report.found;
   if (report.no_support) result.degraded |= kNoSupportFound;
   if (report.found < report.looked_for) result.degraded |= kObjectsMissing;
@@ -226,17 +225,16 @@ void ParticleFilter::recover_all(FrameStep& step) {
     const WeightReport& report = step.reports[i];
     const rendering::PoseEvidence current = report.particles[static_cast<std::size_t>(report.heaviest)].evidence;
     const core::RandomStream mine = stream.at(belief.step, static_cast<std::uint32_t>(i));
-    counters.recoveries_tried += look ? 1 : 0;
     const std::optional<ObjectBelief> before = look ? std::optional(object) : std::nullopt;
     if (!look || !recover(frame, terms, target, current, settings_.augment, settings_.weight, settings_.initialise,
                           tools_, mine, object)) {
       if (is_unseen) {
-        counters.hidden_proposed += wander_unseen(frame, terms, target, current, step.dt, settings_.weight,
-                                                  settings_.initialise, tools_, mine, object);
+        wander_unseen(frame, terms, target, current, step.dt, settings_.weight, settings_.initialise, tools_, mine,
+                      object);
       }
       if (object.frames_refuted > 0) {
-        counters.hidden_proposed += propose_hidden(frame, terms, target, belief.scene->gravity_W, settings_.augment,
-                                                   settings_.weight, settings_.initialise, tools_, mine, object);
+        propose_hidden(frame, terms, target, belief.scene->gravity_W, settings_.augment, settings_.weight,
+                       settings_.initialise, tools_, mine, object);
       }
       continue;
     }
@@ -258,12 +256,11 @@ void ParticleFilter::recover_all(FrameStep& step) {
   }
 }
 
-std::vector<Island> ParticleFilter::join_islands(Belief& belief, double dt, StepCounters& counters) {
+std::vector<Island> ParticleFilter::join_islands(Belief& belief, double dt) {
   if (!settings_.worlds.joint) return {};
   std::vector<Island> islands = islands_that_change(belief, dt, settings_.worlds, touch_, search_.threads());
   const core::RandomStream stream(belief.seed, core::Purpose::kStartBelief);
-  for (const Island& island : islands)
-    counters.worlds_joined += join_worlds(island, settings_.resample, stream, belief) ? 1 : 0;
+  for (const Island& island : islands) join_worlds(island, settings_.resample, stream, belief);
   return islands;
 }
 
@@ -275,13 +272,12 @@ void ParticleFilter::resample_all(FrameStep& step) {
     if (!are_worlds(belief, island)) continue;  // a member was looked at by itself meanwhile
     for (const std::size_t member : island) in_worlds[member] = true;
     const core::RandomStream mine = stream.at(belief.step, static_cast<std::uint32_t>(island.front()));
-    step.result.counters.resampled += resample_worlds(island, settings_.resample, mine, belief);
+    resample_worlds(island, settings_.resample, mine, belief);
   }
   for (std::size_t i = 0; i < belief.objects.size(); ++i)
     if (!in_worlds[i])
-      step.result.counters.resampled +=
-          resample_within_turns(settings_.resample, stream.at(belief.step, static_cast<std::uint32_t>(i)),
-                                model_of(belief, i).symmetry, belief.objects[i].particles);
+      resample_within_turns(settings_.resample, stream.at(belief.step, static_cast<std::uint32_t>(i)),
+                            model_of(belief, i).symmetry, belief.objects[i].particles);
 }
 
 void ParticleFilter::look_for_more(FrameStep& step) {
@@ -342,12 +338,11 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   const std::vector<Pose> X_WG = robot_poses(belief, observation, &result.degraded);
   std::vector<Island> islands;
   if (!first && !is_at_once) {
-    islands = join_islands(belief, dt, result.counters);
+    islands = join_islands(belief, dt);
     const core::RandomStream stream(belief.seed, core::Purpose::kProcessNoise);
     const PredictTools tools{simulators_, robot_bounds_, stream, search_.threads()};
     PredictReport report = predict(belief, control, X_WG, dt, settings_.predict, tools, islands,
                                    seen_by_others(belief, observation.camera));
-    result.counters.pushed_particles = report.pushed;
     result.counters.simulated = report.simulated;
     result.counters.not_simulated = report.not_simulated;
     result.physics_failure = std::move(report.failure);
@@ -393,9 +388,6 @@ StepResult ParticleFilter::step(const Belief& previous, const belief::Observatio
   learn_colors(frame, observation, current.reports, settings_.frame.colors, tools_, belief);
   result.counters.inferred_releases = infer_releases(settings_.predict, belief);
   LearnReport learned = learn_physics(belief, settings_.learn_physics, simulators_, search_.threads());
-  result.counters.physics_runs = learned.runs;
-  result.counters.physics_lessons = learned.lessons;
-  result.counters.physics_unexplained = learned.unexplained;
   if (!learned.failure.empty()) result.degraded |= kLearningFailed;
   result.learning_failure = std::move(learned.failure);
 

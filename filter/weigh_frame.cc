@@ -93,7 +93,6 @@ void ParticleFilter::weigh_one(FrameStep& step, std::size_t object, double dt, c
     share_among_turns(before, model_of(belief, object).symmetry, seen.particles, seeing_cameras(step.by(), seen),
                       turned_log_odds(belief.scene->objects[object]), is_looked_at ? 0.0 : kTurnMemory);
   }
-  for (const ParticleWeight& particle : report.particles) step.result.counters.hidden_particles += particle.hidden;
 }
 
 void ParticleFilter::weigh_worlds(FrameStep& step, const Island& island, double dt) {
@@ -118,7 +117,6 @@ void ParticleFilter::weigh_worlds(FrameStep& step, const Island& island, double 
     WorldTerms terms =
         world_terms(step.frame, {target_in(step, member), &belief.objects[member].particles}, others, outside, tools_);
     terms.pixels = pixels;
-    step.result.counters.world_views += static_cast<int>(terms.views.size());
     weigh_one(step, member, dt, &terms);
     step.depths[member] = depth_in(step, member);
   }
@@ -185,7 +183,6 @@ void ParticleFilter::exchange_all(FrameStep& step) {
       exchange(belief.objects[i], belief.objects[j]);
       std::swap(step.depths[i], step.depths[j]);
       std::swap(step.reports[i], step.reports[j]);
-      ++step.result.counters.exchanges;
     }
   }
 }

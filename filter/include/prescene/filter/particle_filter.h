@@ -90,25 +90,13 @@ struct StepCounters {
   int simulated = 0;      ///< Particles that physics moved, or found to stay where they rest.
   int not_simulated = 0;  ///< That it was to move and could not: they went on at constant velocity.
   int not_drawn = 0;      ///< Calls of the renderer that failed.
-  int resampled = 0;      ///< Particle sets.
-  int recoveries_tried = 0;
-  int recoveries = 0;  ///< That succeeded.
+  int recoveries = 0;     ///< Searches for an object that moved it.
   int new_objects = 0;
-  int forgotten_objects = 0;    ///< Lost things that the scene does not name.
-  int inferred_releases = 0;    ///< Objects that were seen to have left their hand.
-  int physics_runs = 0;         ///< Simulated to learn physical parameters, ...
-  int physics_lessons = 0;      ///< ... episodes that changed what is believed of them, ...
-  int physics_unexplained = 0;  ///< ... and episodes that no value of theirs explains.
-  int exchanges = 0;            ///< Pairs of one shape that had been taken for each other.
-  int turned_by_print = 0;      ///< Objects moved to a pose that depth takes for the same.
-  int joint_islands = 0;        ///< Whose particles were worlds in this step, ...
-  int worlds_joined = 0;        ///< ... those that had none before it, ...
-  int world_views = 0;          ///< ... and frames that were prepared for what hides what in them.
-  int pushed_particles = 0;     ///< At rest, that a robot body, a push or another of their world set in motion.
-  int hidden_particles = 0;     ///< That stayed hidden.
-  int hidden_proposed = 0;      ///< Put at places where a refuted object may hide.
-  int looked_for = 0;           ///< At the start.
-  int found = 0;
+  int forgotten_objects = 0;  ///< Lost things that the scene does not name.
+  int inferred_releases = 0;  ///< Objects that were seen to have left their hand.
+  int turned_by_print = 0;    ///< Objects moved to a pose that depth takes for the same.
+  int joint_islands = 0;      ///< Whose particles were worlds in this step.
+  int found = 0;              ///< At the start.
 };
 
 /// A hash of the belief after each stage, for finding where two runs part.
@@ -167,7 +155,7 @@ class ParticleFilter {
   void note_failed_rendering(StepResult& result);
   void follow_supports(const belief::Observation& observation, StepResult& result);
   void first_look(FrameStep& step, FindWhich which);
-  std::vector<Island> join_islands(belief::Belief& belief, double dt, StepCounters& counters);
+  std::vector<Island> join_islands(belief::Belief& belief, double dt);
   void weigh_one(FrameStep& step, std::size_t object, double dt, const WorldTerms* worlds);
   void weigh_worlds(FrameStep& step, const Island& island, double dt);
   void weigh_all(FrameStep& step, double dt);
