@@ -11,6 +11,7 @@
 #include "prescene/collision/spheres/uncertain_shape_queries.h"
 #include "prescene/collision/spheres/uncertain_sphere_queries.h"
 #include "prescene/core/check.h"
+#include "prescene/simulation/rules/action_draws.h"
 #include "prescene/simulation/similarity.h"
 
 namespace prescene::simulation {
@@ -63,29 +64,46 @@ double first_push(const std::vector<belief::Action>& actions) {
 /// Poses of one object of one component: by draw, by time.
 using Flights = std::vector<std::vector<Pose>>;
 
-/// Gaussian of the poses at both ends of a look, or with `middle` of that point's place alone.
-UncertainPose moments_of(const Flights& flights, std::size_t look, const Vector3d* middle = nullptr) {
-  const auto pose = [&](std::size_t flight, std::size_t end) {
-    const std::vector<Pose>& poses = flights[flight];
-    const Pose& found = poses[std::min(look + end, poses.size() - 1)];
-    return middle ? Pose::from_translation(found * *middle) : found;
-  };
-  const double weight = 0.5 / static_cast<double>(flights.size());
+/// Gaussian of `count` poses.
+template <class PoseOf>
+UncertainPose gaussian_of(std::size_t count, const PoseOf& pose) {
+  const double weight = 1.0 / static_cast<double>(count);
   UncertainPose found;
-  found.X_WB = pose(0, 0);
+  found.X_WB = pose(0);
   for (int iteration = 0; iteration < 4; ++iteration) {  // rotations have no mean in closed form
     Vector6d mean = Vector6d::Zero();
-    for (std::size_t i = 0; i < flights.size(); ++i)
-      for (std::size_t end : {0U, 1U}) mean += weight * geometry::box_minus(pose(i, end), found.X_WB);
+    for (std::size_t i = 0; i < count; ++i) mean += weight * geometry::box_minus(pose(i), found.X_WB);
     found.X_WB = geometry::box_plus(found.X_WB, mean);
   }
-  for (std::size_t i = 0; i < flights.size(); ++i)
-    for (std::size_t end : {0U, 1U}) {
-      const Vector6d error = geometry::box_minus(pose(i, end), found.X_WB);
-      found.covariance += weight * error * error.transpose();
-    }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vector6d error = geometry::box_minus(pose(i), found.X_WB);
+    found.covariance += weight * error * error.transpose();
+  }
   return found;
 }
+
+/// Gaussian of the poses at both ends of a look, or with `middle` of that point's place alone.
+UncertainPose moments_of(const Flights& flights, std::size_t look, const Vector3d* middle = nullptr) {
+  return gaussian_of(2 * flights.size(), [&](std::size_t i) {
+    const std::vector<Pose>& poses = flights[i / 2];
+    const Pose& found = poses[std::min(look + i % 2, poses.size() - 1)];
+    return middle ? Pose::from_translation(found * *middle) : found;
+  });
+}
+
+/// Where a body of the robot is within a look.
+struct RobotPlaces {
+  std::vector<Pose> known;  ///< One after the other, ...
+  std::vector<Pose> drawn;  ///< ... or any of these, as a Gaussian, where draws have it in different places.
+
+  /// Of a shape of the body.
+  std::vector<UncertainPose> of_shape(const Pose& X_BS) const {
+    std::vector<UncertainPose> places;
+    for (const Pose& X_WB : known) places.push_back(UncertainPose{X_WB * X_BS});
+    if (!drawn.empty()) places.push_back(gaussian_of(drawn.size(), [&](std::size_t i) { return drawn[i] * X_BS; }));
+    return places;
+  }
+};
 
 /// An object of a component at a look.
 class PlacedObject {
@@ -118,7 +136,7 @@ class Touching {
   /// Of an object with any body, numbered as in belief::ContactInterval, where the objects and the robot's bodies are.
   /// The ball first: however uncertain the object's rotation is, it does not count there.
   Answer ask(std::size_t object, std::size_t other, std::vector<PlacedObject>& placed,
-             const std::vector<std::vector<Pose>>& robot) {
+             const std::vector<RobotPlaces>& robot) {
     const std::size_t objects = scene_.objects.size(), supports = scene_.supports.size();
     PlacedObject& own = placed[object];
     const FlightBodies::Object& body = bodies_.object(object);
@@ -134,10 +152,9 @@ class Touching {
     }
     const bool fixed = other < objects + supports;
     const std::size_t index = fixed ? other - objects : other - objects - supports;
-    const std::vector<Pose> poses = fixed ? std::vector<Pose>{scene_.supports[index].X_WS} : robot[index];
+    const RobotPlaces places = fixed ? RobotPlaces{{scene_.supports[index].X_WS}, {}} : robot[index];
     for (const FlightBodies::Placed& shape : fixed ? bodies_.support(index) : bodies_.robot_body(index)) {
-      for (const Pose& X_WB : poses) {
-        const UncertainPose there{X_WB * shape.X_BS};
+      for (const UncertainPose& there : places.of_shape(shape.X_BS)) {
         if (collision::uncertain_overlap(*body.ball, *shape.shape, between(own.middle(), there), scratch_).state ==
             OverlapState::kNone)
           continue;
@@ -223,6 +240,72 @@ class Flyer {
   double start_time_ = 0.0;
 };
 
+/// Follows the robot's bodies; those that hold or grasp something as each draw has it.
+class RobotFollower {
+ public:
+  RobotFollower(const belief::Scene& scene, const StartDistribution& starts, const std::vector<belief::Action>& actions,
+                const core::RandomStream& stream, int draws)
+      : scene_(scene), actions_(actions), leads_(scene.robot.size(), false) {
+    const auto note = [&](const std::string& hand) {
+      if (const std::optional<int> body = belief::find_robot_body(scene, hand))
+        leads_[static_cast<std::size_t>(*body)] = true;
+    };
+    for (const belief::SceneObject& object : scene.objects)
+      if (object.held_by) note(*object.held_by);
+    for (const belief::Action& action : actions)
+      if (const auto* grasp = std::get_if<belief::Grasp>(&action.what)) note(grasp->hand);
+    if (actions.empty()) leads_.assign(leads_.size(), false);
+    if (std::find(leads_.begin(), leads_.end(), true) == leads_.end()) return;
+    for (const StartSampler& sampler : samplers_of(starts, stream)) {
+      starts_.emplace_back();
+      for (int n = 0; n < draws; ++n) starts_.back().push_back(sampler.draw(static_cast<std::uint32_t>(n)));
+    }
+    for (int n = 0; n < draws; ++n) drawn_.push_back(drawn_actions(stream.at(0, static_cast<std::uint32_t>(n))));
+  }
+
+  /// Between two times (s since the scene's start), in a component.
+  std::vector<RobotPlaces> within(double begin, double end, std::size_t component) const {
+    std::vector<RobotPlaces> places(scene_.robot.size());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      for (const double time : {0.5 * (begin + end), begin, end}) {
+        const std::vector<Pose> now = at(static_cast<int>(i), time, component);
+        const bool is_one = std::all_of(now.begin(), now.end(), [&](const Pose& X_WB) { return X_WB == now.front(); });
+        if (is_one && (places[i].known.empty() || !(now.front() == places[i].known.front())))
+          places[i].known.push_back(now.front());
+        if (!is_one) places[i].drawn.insert(places[i].drawn.end(), now.begin(), now.end());
+      }
+    }
+    return places;
+  }
+
+ private:
+  /// As the flights of the objects draw theirs.
+  std::vector<belief::Action> drawn_actions(const core::RandomStream& stream) const {
+    std::vector<belief::Action> fixed = actions_;
+    for (const belief::SceneObject& object : scene_.objects) {
+      const std::vector<DrawnAction> drawn = draw_actions(actions_of(actions_, object.name), stream);
+      auto next = drawn.begin();
+      for (belief::Action& action : fixed)
+        if (belief::object_of(action) == object.name) fix_draws(*next++, action);
+    }
+    return fixed;
+  }
+  std::vector<Pose> at(int body, double time, std::size_t component) const {
+    if (!leads_[static_cast<std::size_t>(body)]) return {belief::robot_pose_at(scene_, actions_, body, time)};
+    std::vector<Pose> poses;
+    for (std::size_t n = 0; n < drawn_.size(); ++n)
+      poses.push_back(
+          belief::robot_pose_at(scene_, drawn_[n], belief::MotionStart{&starts_[component][n], {}}, body, time));
+    return poses;
+  }
+
+  const belief::Scene& scene_;
+  const std::vector<belief::Action>& actions_;
+  std::vector<bool> leads_;                              // by body: where it is may depend on what it holds
+  std::vector<std::vector<belief::WorldState>> starts_;  // by component, by draw
+  std::vector<std::vector<belief::Action>> drawn_;       // by draw
+};
+
 /// Pairs (object, body) that count once they have parted: what is held and what holds it.
 std::vector<std::vector<bool>> held_pairs(const belief::Scene& scene, std::size_t bodies) {
   std::vector<std::vector<bool>> parting(scene.objects.size(), std::vector<bool>(bodies, false));
@@ -261,6 +344,7 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
 
   Flyer flyer(scene, starts, request.actions, stream, options);
   PRESCENE_RETURN_IF_ERROR(flyer.make_simulators(scene, make_simulator, cancellation));
+  const RobotFollower follower(scene, starts, request.actions, stream, options.draws);
   Touching touching(scene, bodies);
   std::vector<std::vector<bool>> parting = held_pairs(scene, body_count);
   std::vector<std::vector<Flights>> flights;
@@ -277,14 +361,9 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
       if (!flyer.fly(seconds, pool, cancellation, flights))
         return core::cancelled("the flight was not followed to its end");
     }
-    std::vector<std::vector<Pose>> robot(scene.robot.size());  // by body: where it is within the look
-    for (std::size_t i = 0; i < scene.robot.size(); ++i) {
-      for (const double share : {0.5, 0.0, 1.0}) {
-        const double time = flyer.start_time() + (static_cast<double>(look) + share) * options.interval;
-        const Pose X_WB = belief::robot_pose_at(scene, request.actions, static_cast<int>(i), time);
-        if (robot[i].empty() || !(X_WB == robot[i].front())) robot[i].push_back(X_WB);
-      }
-    }
+    const double begin = flyer.start_time() + static_cast<double>(look) * options.interval;
+    std::vector<std::vector<RobotPlaces>> robot;
+    for (std::size_t k = 0; k < components; ++k) robot.push_back(follower.within(begin, begin + options.interval, k));
     std::vector<std::vector<PlacedObject>> placed(components);
     for (std::size_t k = 0; k < components; ++k)
       for (std::size_t i = 0; i < objects; ++i) placed[k].emplace_back(flights[k][i], look, bodies.object(i).middle);
@@ -295,7 +374,7 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
         FlightOpening opening{static_cast<int>(i), static_cast<int>(other)};
         bool apart = true;
         for (std::size_t k = 0; k < components; ++k) {
-          const Touching::Answer answer = touching.ask(i, other, placed[k], robot);
+          const Touching::Answer answer = touching.ask(i, other, placed[k], robot[k]);
           const double share = starts.components[k].weight / total;
           apart = apart && answer.apart;
           opening.probability += share * answer.probability;

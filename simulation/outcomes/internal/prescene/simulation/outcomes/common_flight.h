@@ -94,10 +94,9 @@ struct CommonFlightOptions {
 /// poses (those of both ends of a look together) are asked whether they touch: uncertain_overlap() of
 /// prescene/collision/spheres. The robot's bodies are asked where they are at both ends of a look and in its middle:
 /// what moves by more than its own size within half a look could miss something. What is held does not touch what holds
-/// it, nor after its release until they have parted. Hands go where the scene's mean start and the means of goals have
-/// them, while what they carry is followed draw by draw: a hand that carries what is held somewhat otherwise, or is to
-/// be put elsewhere, may meet other things before the flight ends. The distribution opens at the first look in which a
-/// pair of some component is not surely apart, or a push begins. Errors of different objects count as independent.
+/// it, nor after its release until they have parted. Hands that hold or grasp something go where each draw has them, as
+/// Gaussians of these poses. The distribution opens at the first look in which a pair of some component is not surely
+/// apart, or a push begins. Errors of different objects, and of hands, count as independent.
 /// Fails as the factory does, and with kCancelled.
 core::Result<CommonFlight> common_flight(const belief::Scene& scene, const FlightBodies& bodies,
                                          const StartDistribution& starts, const RunRequest& request,
