@@ -162,7 +162,8 @@ TEST_F(TossEvaluationTest, TwinsOfOneFlightAreScoredWithTheScenesGravity) {
     for (geometry::Pose& X : motions.back().X_WO)
       X = geometry::Pose{geometry::exp_rotation({0.0, 0.0, 0.5 * i}), geometry::Vector3d(0.1 * i, 0.0, 0.0)} * X;
   }
-  const auto found = evaluate_model(dataset(motions), truth_file({2e-4, 2e-3, 0.0}), backends_, 1);
+  const MotionDataset data = dataset(motions);  // with the scene of truth_file()
+  const auto found = evaluate_model(data, truth_file({2e-4, 2e-3, 0.0}), backends_, 1);
   ASSERT_TRUE(found.ok()) << found.status().message();
   EXPECT_EQ(found->scores.n, 4);
   EXPECT_EQ(found->scores.independent, 1);
