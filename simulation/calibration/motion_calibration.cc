@@ -288,7 +288,10 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     }
     return failure.ok();
   };
-  const SearchResult found = search_from(varied.starts(), cost, options.max_evaluations, stream, report);
+  const auto slides = std::ranges::count(motions, MotionBeginning::kSlide, &RecordedMotion::beginning);
+  const double slide_share = static_cast<double>(slides) / static_cast<double>(motions.size());
+  const SearchResult found =
+      search_from(varied.starts(slide_share < 1.0), cost, options.max_evaluations, stream, report);
   PRESCENE_RETURN_IF_ERROR(failure);
 
   // The noise goes by what it makes of the score, in turns with the rest.
@@ -326,8 +329,6 @@ core::Result<MotionCalibration> calibrate_motions(const std::vector<RecordedMoti
     best = VariedParameters::with_noise(best, noise.values);
     result.evaluations += noise.evaluations;
   }
-  const auto slides = std::ranges::count(motions, MotionBeginning::kSlide, &RecordedMotion::beginning);
-  const double slide_share = static_cast<double>(slides) / static_cast<double>(motions.size());
   result.parameters = reported(estimate, varied, prior, slide_share, options.position_noise);
   result.without = values_without(estimate, varied, result.parameters);
   result.start_noise = best.start_noise;

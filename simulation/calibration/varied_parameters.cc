@@ -14,6 +14,10 @@ constexpr double kFarthest = 5.0;
 // The mean of frictions before, times these, is where searches begin. Where friction is so large that all impacts grip,
 // its value makes no difference, and nothing there says which way is better.
 constexpr std::array kFrictionStarts = {1.0, 0.2, 2.0};
+// Of the starts' noise, in that of the tracker. The one that is large is tried with the believed friction only: where
+// little is simulated as it is in nature, a search from little noise may end where a scatter of friction stands for
+// what is wrong. Not of slides alone: it would lift them off their support, so that they bounce.
+constexpr double kNoiseStart = 3.0, kLargeNoiseStart = 30.0;
 
 struct Range {
   double step;  // Half of the first one of the search.
@@ -56,7 +60,7 @@ VariedParameters::VariedParameters(const MotionPrior& prior, double radius_of_gy
   }
 }
 
-std::vector<std::vector<SearchParameter>> VariedParameters::starts() const {
+std::vector<std::vector<SearchParameter>> VariedParameters::starts(bool any_flight) const {
   std::vector<SearchParameter> believed;
   for (const EstimatedParameter& p : estimated_) {
     const double start = std::clamp(p.prior_mean, p.low, p.high);
@@ -65,7 +69,7 @@ std::vector<std::vector<SearchParameter>> VariedParameters::starts() const {
                         std::min(p.high, start + far)});
   }
   MotionHypothesis unsure;
-  unsure.start_noise = 3.0;
+  unsure.start_noise = kNoiseStart;
   unsure.friction_scatter = 0.03;
   for (const SearchParameter& p : noise(unsure)) believed.push_back(p);
 
@@ -81,6 +85,11 @@ std::vector<std::vector<SearchParameter>> VariedParameters::starts() const {
     }
     if (elsewhere) all.push_back(std::move(start));
   }
+  if (!any_flight) return all;
+  unsure.start_noise = kLargeNoiseStart;
+  std::vector<SearchParameter> noisy = all.front();
+  std::ranges::copy(noise(unsure), noisy.begin() + static_cast<std::ptrdiff_t>(estimated_.size()));
+  all.push_back(std::move(noisy));
   return all;
 }
 

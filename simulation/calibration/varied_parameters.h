@@ -22,8 +22,9 @@ class VariedParameters {
   /// Places of the free ones in a MotionPrior.
   const std::vector<std::size_t>& free() const { return free_; }
   /// Where the search begins, of the free parameters and the noise: at small, believed and large friction, as far as
-  /// the prior leaves them open. The one that is believed comes first.
-  std::vector<std::vector<SearchParameter>> starts() const;
+  /// the prior leaves them open, and at large noise if any recording begins in flight. The one that is believed comes
+  /// first.
+  std::vector<std::vector<SearchParameter>> starts(bool any_flight) const;
   /// Of a search for the noise alone.
   static std::vector<SearchParameter> noise(const MotionHypothesis& at);
   std::vector<EstimatedParameter> estimated(const MotionHypothesis& at) const;

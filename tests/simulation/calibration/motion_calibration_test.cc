@@ -24,7 +24,10 @@ using simulation::MotionParameter;
 using simulation::MotionPrior;
 using simulation::RecordedMotion;
 using simulation::TimedPose;
+using ::testing::AllOf;
+using ::testing::Gt;
 using ::testing::HasSubstr;
+using ::testing::Lt;
 
 class MotionCalibrationTest : public ::testing::Test {
  protected:
@@ -106,6 +109,19 @@ TEST_F(MotionCalibrationTest, RecoversFrictionsAndRestitution) {
     EXPECT_LT(p.left_of_prior, 0.3) << to_string(p.parameter);
   }
   EXPECT_LT(found->cost, found->start_cost);
+}
+
+// As where nature differs from the simulator: starts scatter far more than the tracker's noise says.
+TEST_F(MotionCalibrationTest, FindsStartsThatAreFarLessCertainThanTheTracker) {
+  const auto motions = begun(tosses({}, 14));
+  ASSERT_TRUE(motions.ok()) << motions.status().message();
+  options_.position_noise = noise_.position / 40.0;
+  options_.rotation_noise = noise_.rotation / 40.0;
+  options_.max_evaluations = 300;
+  const auto found = calibrated(*motions, contact_prior(), pool_);
+  ASSERT_TRUE(found.ok()) << found.status().message();
+  EXPECT_THAT(found->start_noise, AllOf(Gt(10.0), Lt(100.0)));
+  EXPECT_LT(found->friction_scatter, 0.06);
 }
 
 TEST_F(MotionCalibrationTest, AnyNumberOfThreadsGivesTheSameBits) {
