@@ -115,12 +115,11 @@ TEST_F(MotionCalibrationTest, RecoversFrictionsAndRestitution) {
 TEST_F(MotionCalibrationTest, FindsStartsThatAreFarLessCertainThanTheTracker) {
   const auto motions = begun(tosses({}, 14));
   ASSERT_TRUE(motions.ok()) << motions.status().message();
-  options_.position_noise = noise_.position / 40.0;
-  options_.rotation_noise = noise_.rotation / 40.0;
-  options_.max_evaluations = 300;
+  options_.position_noise = noise_.position / 100.0;
+  options_.rotation_noise = noise_.rotation / 100.0;
   const auto found = calibrated(*motions, contact_prior(), pool_);
   ASSERT_TRUE(found.ok()) << found.status().message();
-  EXPECT_THAT(found->start_noise, AllOf(Gt(10.0), Lt(100.0)));
+  EXPECT_THAT(found->start_noise, AllOf(Gt(20.0), Lt(300.0)));  // 1.5 where searches begin with little noise only
   EXPECT_LT(found->friction_scatter, 0.06);
 }
 
