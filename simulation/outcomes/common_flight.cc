@@ -263,22 +263,27 @@ class RobotFollower {
     for (int n = 0; n < draws; ++n) drawn_.push_back(drawn_actions(stream.at(0, static_cast<std::uint32_t>(n))));
   }
 
-  /// Between two times (s since the scene's start), in a component.
-  std::vector<RobotPlaces> within(double begin, double end, std::size_t component) const {
-    std::vector<RobotPlaces> places(scene_.robot.size());
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      for (const double time : {0.5 * (begin + end), begin, end}) {
-        const std::vector<Pose> now = at(static_cast<int>(i), time, component);
-        const bool is_one = std::all_of(now.begin(), now.end(), [&](const Pose& X_WB) { return X_WB == now.front(); });
-        if (is_one && (places[i].known.empty() || !(now.front() == places[i].known.front())))
-          places[i].known.push_back(now.front());
-        if (!is_one) places[i].drawn.insert(places[i].drawn.end(), now.begin(), now.end());
-      }
-    }
+  /// Between two times (s since the scene's start); by component, by body.
+  std::vector<std::vector<RobotPlaces>> within(double begin, double end, std::size_t components) const {
+    std::vector<std::vector<RobotPlaces>> places(components, std::vector<RobotPlaces>(scene_.robot.size()));
+    for (std::size_t k = 0; k < components; ++k)
+      for (std::size_t i = 0; i < scene_.robot.size(); ++i)
+        places[k][i] = k == 0 || leads_[i] ? places_of(static_cast<int>(i), begin, end, k) : places[0][i];
     return places;
   }
 
  private:
+  RobotPlaces places_of(int body, double begin, double end, std::size_t component) const {
+    RobotPlaces places;
+    for (const double time : {0.5 * (begin + end), begin, end}) {
+      const std::vector<Pose> now = at(body, time, component);
+      const bool is_one = std::all_of(now.begin(), now.end(), [&](const Pose& X_WB) { return X_WB == now.front(); });
+      if (is_one && (places.known.empty() || !(now.front() == places.known.front())))
+        places.known.push_back(now.front());
+      if (!is_one) places.drawn.insert(places.drawn.end(), now.begin(), now.end());
+    }
+    return places;
+  }
   /// As the flights of the objects draw theirs.
   std::vector<belief::Action> drawn_actions(const core::RandomStream& stream) const {
     std::vector<belief::Action> fixed = actions_;
@@ -362,8 +367,7 @@ core::Result<CommonFlight> common_flight(const belief::Scene& scene, const Fligh
         return core::cancelled("the flight was not followed to its end");
     }
     const double begin = flyer.start_time() + static_cast<double>(look) * options.interval;
-    std::vector<std::vector<RobotPlaces>> robot;
-    for (std::size_t k = 0; k < components; ++k) robot.push_back(follower.within(begin, begin + options.interval, k));
+    const std::vector<std::vector<RobotPlaces>> robot = follower.within(begin, begin + options.interval, components);
     std::vector<std::vector<PlacedObject>> placed(components);
     for (std::size_t k = 0; k < components; ++k)
       for (std::size_t i = 0; i < objects; ++i) placed[k].emplace_back(flights[k][i], look, bodies.object(i).middle);
