@@ -197,7 +197,9 @@ core::Status EventSearch::search_rivals() {
     for (std::vector<Judged>* some : {&nothings_, &judged_})
       for (Judged& judged : *some) {
         if (judged.hypothesis.kind == EventKind::kOther || runs_of(judged) > runs) continue;
-        if (is_hopeless(judged) && !unexplained) continue;
+        const bool hopeless =
+            judged.posterior.gave_up || log_posterior(judged) + judged.may_be_more.value_or(0.0) <= best_ - kHopeless;
+        if (hopeless && !unexplained) continue;
         if (cancelled()) return stopped_searching();
         if (out_of_time()) return core::ok_status();
         search(judged, 1, [this] { return out_of_time(); });
@@ -205,11 +207,6 @@ core::Status EventSearch::search_rivals() {
       }
   }
   return core::ok_status();
-}
-
-/// Whether more runs of it can change no probability.
-bool EventSearch::is_hopeless(const Judged& judged) const {
-  return judged.posterior.gave_up || log_posterior(judged) + judged.may_be_more.value_or(0.0) <= best_ - kHopeless;
 }
 
 /// More runs of those whose intervals are wide, as long as there is time.

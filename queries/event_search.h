@@ -59,7 +59,6 @@ class EventSearch {
   void tell(const std::vector<std::size_t>& candidates, const std::vector<Hypothesis>& hypotheses, const Look& look);
   static Judged nothing_about(const std::vector<std::size_t>& candidates, std::size_t candidate,
                               const std::vector<Hypothesis>& hypotheses);
-  bool is_hopeless(const Judged& judged) const;
   void search(Judged& judged, int runs, const std::function<bool()>& out_of_time);
   void evaluate(const Hypothesis& hypothesis, std::span<const LatentPoint> points, std::span<double> log_likelihoods);
   void propose_from_other_touch(const Hypothesis& hypothesis, TemperedTarget& target) const;
